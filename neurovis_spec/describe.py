@@ -10,7 +10,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from neurovis_spec.body import BodyError, Port, open_body
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.compiler.program import RULE, SYNAPSE
 
 
@@ -30,7 +30,7 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
             {
                 "name": entry.name,
                 "size": entry.size,
-                "source": "sensors" if index in sensed else _source(entry.expression, entry.table),
+                "source": "sensors" if index in sensed else _source(entry),
                 **({"hold": True} if entry.hold else {}),
             }
             for index, entry in enumerate(network.inputs)
@@ -163,5 +163,9 @@ def _is_of(name: str, port: Port) -> bool:
     return name == port.name or name in port.numbers
 
 
-def _source(expression: object, table: object) -> str:
-    return "expression" if expression is not None else "table" if table is not None else "external"
+def _source(entry: Input) -> str:
+    if entry.spikes is not None:
+        return "spikes"
+    if entry.is_drawn:
+        return "poisson"
+    return "expression" if entry.expression is not None else "table" if entry.table is not None else "external"

@@ -412,9 +412,8 @@ def test_parameters_of_rules_that_do_not_fit() -> None:
         rates("1/n")
     (finding,) = caught.value.diagnostics
     assert finding.code == "unknown-name"
-    assert (
-        finding.hint == "'n' is known elsewhere: the number of neurons of the group; a connection has n_from and n_to"
-    )
+    known = "how many neurons the group, or numbers the input, has; a connection has n_from and n_to"
+    assert finding.hint == f"'n' is known elsewhere: {known}"
 
 
 def test_parameters_of_the_rule_of_an_entry_at_fault_are_looked_at() -> None:

@@ -57,6 +57,7 @@ def docs(*arguments: str) -> subprocess.CompletedProcess[str]:
 def test_an_example_of_a_key_compiles(path: str, tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     np.savetxt(tmp_path / "data" / "sensed.csv", [[0.5]], delimiter=",")
+    (tmp_path / "data" / "spikes.csv").write_text("time,index,t_ms,id\n0.001,1,1,1\n")
     shutil.copy(ROOT / "specs" / "walk" / "hexapod.xml", tmp_path)
     (tmp_path / "library").mkdir()
     (tmp_path / "library" / "legs.yaml").write_text("modules: {leg: {neurons: {K: {bias: 1}}}}", encoding="utf-8")

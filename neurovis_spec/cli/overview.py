@@ -291,9 +291,11 @@ def _input(entry: Input, is_sensed: bool) -> tuple[str, str, str]:
     if is_sensed:
         source = "sensors"
     elif entry.expression is not None:
-        source = "expression, once a step" if entry.hold else "expression"
+        source = "poisson" if entry.is_drawn else "expression, once a step" if entry.hold else "expression"
     elif entry.table is not None:
         source = f"table of {count(len(entry.table), 'row')}"
+    elif entry.spikes is not None:
+        source = count(len(entry.spikes.times), "spike")
     return entry.name, str(entry.size), source
 
 

@@ -47,7 +47,7 @@ SCHEMA: Mapping[type, Content] = {
         "sources targets weights centres delays rules entry low high entries",
         "descriptions learns labels routes undelayed synapses twins lags",
     ),
-    Input: content("Input", "name start size expression table", "slots parts hold"),
+    Input: content("Input", "name start size expression table", "slots parts hold indexed spikes widths"),
     Output: content("Output", "name neurons scalar", "states"),
     Quantity: content("Quantity", "name initial each_step each_episode", "derivative noise unit acts"),
     Hidden: content("Quantity", "name initial each_step each_episode", "derivative noise unit acts"),
@@ -96,6 +96,11 @@ def _flows(network: Network, places: IntArray) -> Iterator[tuple[object, ...]]:
     if neurons.port_input:
         yield "port_input", {port: np.append(places, -1)[given] for port, given in neurons.port_input.items()}
     yield from (("noise", one.name, one.port, one.state) for one in network.noises if one.port != DRIVE)
+    if indexed := sorted(one.name for one in network.inputs if one.indexed):
+        yield "indexed", *indexed
+    for one in sorted(network.inputs, key=lambda entry: entry.name):
+        if one.spikes is not None:
+            yield "spikes", one.name, one.spikes.times, one.spikes.indices
     if network.connections.lags is not None:
         yield "lags", network.connections.lags
     if network.connections.twins is not None:

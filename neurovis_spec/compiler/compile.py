@@ -133,7 +133,7 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
     layout = layout_settings(spec.layout, scopes, census, findings)
     connected = connect(scopes, census, request.limits, declared.seed)
     files, used = [file.model for file in request.includes.files], integrated(census.groups, connected.bundles)
-    check_dt(spec, files, used, findings)
+    check_dt(spec, files, used, [scope.section for scope in scopes], findings)
     if declared.integration.method in BY_SLOPE:
         check_slopes(spec, files, used, findings)
         check_slopes_through(spec, files, census, connected.bundles, findings)

@@ -163,7 +163,7 @@ def made_anew(models: Sequence[Definition], model: Indices, wired: Wired, held: 
 def held_at(neurons: Neurons, inputs: Sequence[Input], noises: Sequence[Noise]) -> Mapping[str, BoolArray]:
     """By ports for each neuron whether a number is added there that is the same over a step: a table's, one that is
     supplied, noise."""
-    flows = np.array([*(one.expression is not None for one in inputs for _ in range(one.size)), True])
+    flows = np.array([*(one.is_formula for one in inputs for _ in range(one.size)), True])
     result = {port: ~flows[given] for port, given in ((DRIVE, neurons.input), *neurons.port_input.items())}
     for noise in noises:
         if not noise.state:

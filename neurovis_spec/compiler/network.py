@@ -39,12 +39,18 @@ from neurovis_spec.compiler.program import (
     Use,
 )
 from neurovis_spec.compiler.ros_settings import RosSettings
-from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.language.expressions.tree import Tree, draws
 from neurovis_spec.language.units import TIMES
 from neurovis_spec.language.words import Combine, NeuronRole
 
 if TYPE_CHECKING:
     from neurovis_spec.compiler.body_settings import BodySettings
+
+
+#: how near to the end of a step a spike is in it: as a share of the step, and of the number of the step
+_NEAR_STEP, _ROUNDED = 1e-9, 1e-15
+#: a step beyond all runs
+_NEVER = 2.0**62
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,11 +212,29 @@ class Connections:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Spikes:
+    """Spikes at given times: ``times`` in seconds, at least 0 and ascending, and which number of an input each is of;
+    (spikes,)."""
+
+    times: FloatArray
+    indices: IntArray
+
+    def steps(self, dt: float) -> IntArray:
+        """The step in which each counts, where steps last ``dt`` seconds: k for ((k − 1)·dt, k·dt], within 1e-9 of a
+        step; ascending."""
+        steps = self.times / dt
+        nearest = np.rint(steps)
+        on_grid = np.abs(steps - nearest) <= np.maximum(_NEAR_STEP, _ROUNDED * steps)
+        return np.minimum(np.where(on_grid, nearest, np.ceil(steps)), _NEVER).astype(np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Input:
     """A signal from outside, ``size`` numbers a step, from ``start`` on in the vector of all inputs.
 
-    ``expression`` (of k, t, dt, pi, e and parameters), or ``table`` (one row a step; past its end the last row
-    stays), or neither: supplied by the caller, else 0.
+    ``expression`` (of k, t, dt, pi, e and parameters; where it is ``indexed``, of i and n, too), or ``table`` (one row
+    a step; past its end the last row stays), or ``spikes``, which are counted, or nothing: supplied by the caller,
+    else 0. An expression that draws is drawn anew for each number and step.
     """
 
     name: str
@@ -224,11 +248,31 @@ class Input:
     parts: tuple[Part, ...] = ()
     #: whether an expression is taken once a step, at its end, and not at each stage of the integration
     hold: bool = False
+    #: whether i and n in its expression are the index of each number, from 0, and how many there are
+    indexed: bool = False
+    spikes: Spikes | None = None
+    #: what follows parameters and must not become negative: the rate of what is drawn
+    widths: tuple[ParameterFormula, ...] = ()
+
+    @property
+    def has_source(self) -> bool:
+        """Whether it is something where nobody supplies it."""
+        return self.expression is not None or self.table is not None or self.spikes is not None
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether its numbers are drawn."""
+        return self.expression is not None and draws(self.expression)
+
+    @property
+    def is_formula(self) -> bool:
+        """Whether its numbers follow from the step alone: an expression that draws nothing."""
+        return self.expression is not None and not self.is_drawn
 
     @property
     def flows(self) -> bool:
         """Whether it has a value at each stage of the integration."""
-        return self.expression is not None and not self.hold
+        return self.is_formula and not self.hold
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -74,6 +74,8 @@ class Role:
 #: Formulas, by what they see.
 PLAIN: Final = Role("formula")
 RUN: Final = Role("formula", sees=("k", "t"))
+#: A formula of a run for each number of an input; without a size it sees no i and n.
+RUN_EACH: Final = Role("formula", sees=("k", "t", "i", "n"))
 GROUP: Final = Role("formula", sees=("i", "n"))
 GROUP_DRAWN: Final = Role("formula", sees=("i", "n"), draws=True)
 NOISE: Final = Role("formula", sees=("k", "t", "i", "n"), draws=True)

@@ -19,6 +19,7 @@ from neurovis_spec.diagnostics import listed, shorten
 from neurovis_spec.language.grammar import (
     DELAY,
     ENDS,
+    FORMULA,
     FORMULAS,
     GROUP,
     GROUP_DRAWN,
@@ -26,7 +27,7 @@ from neurovis_spec.language.grammar import (
     NOISE,
     PAIR,
     REFERENCES,
-    RUN,
+    RUN_EACH,
     SENT,
     TEXT,
     TWO,
@@ -40,7 +41,6 @@ from neurovis_spec.language.grammar import (
     naming,
 )
 from neurovis_spec.language.keys import apart, mend_torn
-from neurovis_spec.language.library import not_yet
 from neurovis_spec.language.located import (
     IDENTIFIER,
     BoolField,
@@ -61,6 +61,7 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model, Named, Short, entry_hint
 from neurovis_spec.language.patterns import PATTERNS, PatternField
+from neurovis_spec.language.units import TIME_ABOUTS, TIMES
 from neurovis_spec.language.values import (
     FILE,
     ActivationField,
@@ -136,6 +137,45 @@ def _one_source(*others: str) -> NotWith:
     return NotWith(others, "'{own}' beside '{other}': an input has one source", "keep '{other}' or '{own}'")
 
 
+def _sized(*others: str) -> NotWith:
+    return NotWith(others, "'{own}' beside '{other}', which has a size of its own", "remove '{own}'")
+
+
+class SpikeColumnsModel(Model):
+    """Which columns of a file have the times of spikes, and the numbers of whom they are of."""
+
+    PLACE: ClassVar[str] = "'columns'"
+
+    time: TextField | None = Field(None, description="The column of the times (default time).")
+    index: TextField | None = Field(
+        None, description="The column that says of which number of the input, from 0, each spike is (default index)."
+    )
+
+
+def _times(node: Node, info: ValidationInfo) -> AnyList:
+    return node if isinstance(node, AnyList) else refuse(info, node, "a list of times for each number of the input")
+
+
+class SpikesModel(Model):
+    """Spikes at given times."""
+
+    PLACE: ClassVar[str] = "'spikes'"
+    BARE: ClassVar[str] = "file"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {"unit": "time", "values": "times"}
+
+    file: TextField | None = Field(None, description="A .csv file with a header and a row for each spike.")
+    times: Annotated[AnyList | None, Leaf(_times, ListOf(ListOf(FORMULA))), NotWith(("file",))] = Field(
+        None, description="The times inline: a list for each number of the input."
+    )
+    columns: Annotated[
+        SpikeColumnsModel | None,
+        Needs(("file",), "'columns' are those of a 'file'", "remove 'columns'"),
+    ] = Field(None, description="What the columns of the file are called: {time: t_ms, index: id}.")
+    time: Annotated[Located[str], words(*TIMES, abouts=TIME_ABOUTS)] | None = Field(
+        None, description="The unit of the times (default s)."
+    )
+
+
 class InputModel(Model):
     """A signal that comes from outside the network."""
 
@@ -143,7 +183,7 @@ class InputModel(Model):
     BARE: ClassVar[str] = "expression"
     ELSEWHERE: ClassVar[AnyMapping[str, str]] = {"value": "expression", "formula": "expression", "data": "values"}
 
-    expression: Annotated[FormulaField, RUN] | None = Field(
+    expression: Annotated[FormulaField, RUN_EACH] | None = Field(
         None, description="A formula of k (the step), t (seconds) and parameters."
     )
     file: Annotated[TextField | None, _one_source("expression")] = Field(
@@ -152,18 +192,23 @@ class InputModel(Model):
     values: Annotated[AnyList | None, Leaf(_table, ListOf(FORMULAS)), _one_source("expression", "file")] = Field(
         None, description="The same, inline: one row a step."
     )
-    size: Annotated[FormulaField | None, _one_source("expression", "file", "values")] = Field(
-        None, description="How many numbers a step, for an input without a source."
+    spikes: Annotated[
+        SpikesModel | None, Short("file", "{file: …} or {times: …}"), _one_source("expression", "file", "values")
+    ] = Field(
+        None, description="Spikes at given times, which are counted: {file: …, time: ms} or {times: [[0.1], []]}."
+    )
+    poisson: Annotated[FormulaField | None, RUN_EACH, _one_source("expression", "file", "values", "spikes")] = Field(
+        None,
+        description="Events at random, so many a second, which are counted: a formula of k, t, i, n and parameters.",
+    )
+    size: Annotated[FormulaField | None, _sized("file", "values")] = Field(
+        None, description="How many numbers a step; an expression is then one of i (from 0) and n, too (default 1)."
     )
     hold: Annotated[
         BoolField | None,
         Needs(("expression",), "'hold' is of an 'expression'; others are the same over a step", "remove 'hold'"),
     ] = Field(None, description="Whether derivatives see it once a step, not as it is at each stage (default false).")
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
-
-    @classmethod
-    def _foreign(cls, name: str) -> tuple[str, str] | None:
-        return not_yet(name, "spikes", "poisson")
 
     @classmethod
     def _instead(cls, node: Node) -> str | None:
@@ -234,7 +279,7 @@ class GroupModel(Model):
     )
     noise: Annotated[NoiseField, NOISE] | None = Field(
         None,
-        description="An expression with normal(m, s) or uniform(a, b), drawn anew and added each step; or by ports.",
+        description="A formula with normal, uniform or poisson, drawn anew and added each step; or by ports.",
     )
     position: Annotated[FileReference | AnyList | None, Leaf(_position, Either((TWO, ListOf(TWO), FILE))), GROUP] = (
         Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")

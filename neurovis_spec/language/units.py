@@ -29,6 +29,10 @@ TIMES: Final[Mapping[str, Fraction]] = {
 }
 #: What units are made of: powers of ten and of sixty (min), and quantities.
 _AXES: Final = ("10", "60", "V", "A", "s", "m", "mol", "rad")
+#: What to say of units of time.
+TIME_ABOUTS: Final[Mapping[str, str]] = {
+    "s": "Seconds.", "ms": "Milliseconds.", "us": "Microseconds.", "min": "Minutes.",
+}  # fmt: skip
 #: What a unit may begin with, as powers of ten.
 _PREFIXES: Final[Mapping[str, int]] = {
     "": 0, "f": -15, "p": -12, "n": -9, "u": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9,

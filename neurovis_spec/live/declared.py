@@ -22,7 +22,7 @@ from neurovis_spec.live.turns import rules
 def declared(compiled: Compilation) -> dict[str, list[dict[str, object]]]:
     """All that can be changed."""
     network, written = compiled.network, compiled.spec.inputs
-    inputs = [entry for entry in network.inputs if entry.expression is None and entry.table is None]
+    inputs = [entry for entry in network.inputs if not entry.has_source]
     sensed = _sensed(network)
     return {
         "parameters": parameters(compiled),

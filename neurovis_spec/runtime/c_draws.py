@@ -1,11 +1,12 @@
 """Random numbers in C, the same bits as ``compiler.draws`` and ``compiler.box_muller`` give.
 
-In: the constants of these. Out: the text of functions: ``nv_uniform`` and ``nv_normal`` of a key and a counter.
+In: the constants of these and of ``compiler.poisson``. Out: the text of functions: ``nv_uniform`` and ``nv_normal`` of
+a key and a counter, ``nv_poisson`` of a mean and a uniform number.
 """
 
 from __future__ import annotations
 
-from neurovis_spec.compiler.values import box_muller
+from neurovis_spec.compiler.values import box_muller, poisson
 
 _TEXT = """static void nv_philox(uint32_t k0, uint32_t k1, uint32_t i, uint32_t step, uint32_t draw, uint32_t w[4])
 {
@@ -39,7 +40,7 @@ _UNIFORM = """static double nv_uniform(uint32_t k0, uint32_t k1, uint32_t i, uin
 }
 """
 
-_NORMAL = """static double nv_polynomial(const double *c, int count, double z)
+_LOGARITHM = """static double nv_polynomial(const double *c, int count, double z)
 {
     double total = c[count - 1]*z;
     total += c[count - 2];
@@ -77,8 +78,9 @@ static double nv_log(double x)
     k -= half;
     return k;
 }
+"""
 
-static double nv_cos_turns(double u)
+_NORMAL = """static double nv_cos_turns(double u)
 {
     static const double sines[SIN_COUNT] = {SIN};
     static const double cosines[COS_COUNT] = {COS};
@@ -107,11 +109,76 @@ static double nv_normal(uint32_t k0, uint32_t k1, uint32_t i, uint32_t step, uin
 """
 
 
+_POISSON = """static double nv_exp_below_zero(double x)
+{
+    static const double c[POISSON_EXP_COUNT] = {POISSON_EXP};
+    const double whole = rint(x*POISSON_LN2_INVERSE);
+    double r = x - whole*LN2_HIGH, total;
+    r = r - whole*LN2_LOW;
+    total = c[0]*r;
+    for (int i = 1; i < POISSON_EXP_COUNT; i++)
+        total = (total + c[i])*r;
+    return ldexp((total + 1.0)*r + 1.0, (int)whole);
+}
+
+static double nv_most_probable(double mean)
+{
+    static const double c[4] = {POISSON_STIRLING};
+    const double k = floor(mean);
+    double e, series, apart;
+    if (k < POISSON_FEW) {
+        double made = nv_exp_below_zero(-mean);
+        for (int i = 1; i <= (int)k; i++)
+            made = made*(mean/i);
+        return made;
+    }
+    e = (mean - k)/k;
+    series = c[3]/(k*k);
+    series = (series + c[2])/(k*k);
+    series = (series + c[1])/(k*k);
+    series = (series + c[0])/k;
+    apart = k*(e - nv_log(1.0 + e));
+    return nv_exp_below_zero(-(apart + series))/sqrt(TAU*k);
+}
+
+static double nv_poisson(double mean, double u)
+{
+    double high, low, up, down, rest;
+    if (!(mean >= 0.0 && mean <= POISSON_LARGEST))
+        return NAN;
+    high = low = floor(mean);
+    up = down = nv_most_probable(mean);
+    rest = u - up;
+    if (rest < 0.0)
+        return high;
+    do {
+        high = high + 1.0;
+        up = up*(mean/high);
+        if (rest < up)
+            return high;
+        rest = rest - up;
+        down = down*(low/mean);
+        low = low - 1.0;
+        if (rest < down)
+            return low;
+        rest = rest - down;
+    } while (up >= POISSON_NOTHING || down >= POISSON_NOTHING);
+    return floor(mean);
+}
+"""
+
+
 def drawing(kinds: set[str]) -> str:
-    """The functions that these kinds of draws (``normal``, ``uniform``) need."""
-    if not kinds:
-        return ""
-    text = _TEXT + ("\n" + _UNIFORM if "uniform" in kinds else "") + ("\n" + _NORMAL if "normal" in kinds else "")
-    for name, value in box_muller.constants().items():
+    """The functions that these kinds of draws (``normal``, ``uniform``, ``poisson``) need; one of ``poisson`` that is
+    counted needs ``uniform``, too."""
+    parts = [
+        (_TEXT, {"normal", "uniform"}),
+        (_UNIFORM, {"uniform"}),
+        (_LOGARITHM, {"normal", "poisson"}),
+        (_NORMAL, {"normal"}),
+        (_POISSON, {"poisson"}),
+    ]
+    text = "\n".join(part for part, of in parts if not of.isdisjoint(kinds))
+    for name, value in {**poisson.constants(), **box_muller.constants()}.items():
         text = text.replace(name, value)
     return text

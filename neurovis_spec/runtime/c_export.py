@@ -20,12 +20,12 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Change, Clamp
 from neurovis_spec.compiler.events.settable import table_of
 from neurovis_spec.compiler.limits import plural
-from neurovis_spec.compiler.network import Input, Network, Noise
+from neurovis_spec.compiler.network import Input, Network, Noise, Spikes
 from neurovis_spec.compiler.program import SYNAPSE, Owner
 from neurovis_spec.compiler.run_checks import without_checks
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.emit_c import Emitter, Value
-from neurovis_spec.language.expressions.tree import Draw
+from neurovis_spec.language.expressions.tree import Draw, Tree
 from neurovis_spec.runtime import c_plan
 from neurovis_spec.runtime.c_backend import SMALL
 from neurovis_spec.runtime.c_code import Code, Form, Tables, function, state_name, words_of
@@ -91,7 +91,7 @@ class Exported:
         self.emitter, self.tables = Emitter(real), Tables(real, None)
         #: the kinds of draws that noise makes, whose functions the source needs
         self.kinds: set[str] = set()
-        self.inputs = [one for one in network.inputs if one.expression is None and one.table is None]
+        self.inputs = [one for one in network.inputs if not one.has_source]
         self.input_names = identifiers(one.name for one in self.inputs)
         self.output_names = identifiers(one.name for one in network.outputs)
         slots = network.settable.index
@@ -300,7 +300,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             _restrict(self.macro) if f"{self.macro}_RESTRICT" in used else "",
             self._names(),
             self.emitter.helpers(used),
-            drawing(self.kinds),
+            drawing(self.kinds.union({"poisson"} if "nv_poisson" in used else ())),
             self.tables.text(used),
             "\n".join(body),
         ]
@@ -514,8 +514,12 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         """The inputs and the noise of a step."""
         code, network = self._code(), self.network
         for number, entry in enumerate(network.inputs):
-            if entry.expression is not None:
+            if entry.is_drawn:
+                self._rates(code, entry)
+            elif entry.expression is not None:
                 write_input(code, network, entry, "v")
+            elif entry.spikes is not None:
+                self._spikes(code, entry, entry.spikes)
             elif entry.table is not None:
                 self._row(code, number, entry)
         for c_name, entry in zip(self.input_names, self.inputs, strict=True):
@@ -547,12 +551,52 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
 
     def _noise(self, code: Code, noise: Noise) -> None:
         """The lines that draw a noise: each number from the stream's key, the member, the step and the draw."""
-        low, high = Stream(self.network.seed, "noise", noise.name).key
+        stream = Stream(self.network.seed, "noise", noise.name)
+        known: dict[str, Value] = {**noise.parameters, **{n: f"parameters[{slot}]" for n, slot in noise.slots.items()}}
+        self._each_drawn(code, stream, noise.expression, known, noise.start, len(noise.members))
+
+    def _rates(self, code: Code, entry: Input) -> None:
+        """The lines that draw an input, in the same way."""
+        assert entry.expression is not None
+        stream = Stream(self.network.seed, "input", entry.name)
+        slots: dict[str, Value] = {name: f"parameters[{slot}]" for name, slot in entry.slots.items()}
+        self._each_drawn(code, stream, entry.expression, {**self.network.parameters, **slots}, entry.start, entry.size)
+
+    def _spikes(self, code: Code, entry: Input, spikes: Spikes) -> None:
+        """The lines that count the spikes of a step: the first of them is searched in their ascending steps."""
+        steps = spikes.steps(self.network.dt)
+        reached = steps < np.iinfo(np.int32).max  # further than the index of a table goes nobody gets
+        steps, indices, count = steps[reached], spikes.indices[reached], int(np.count_nonzero(reached))
+        code.line(code.loop("i", entry.size))
+        code.line(f"    v[{entry.start} + i] = {code.text(0.0)};")
+        if not count:
+            return
+        of = code.tables.name(steps)
+        with code.block(""):
+            code.line(f"int32_t low = 0, high = {count};")
+            with code.block("while (low < high)"):
+                code.line("const int32_t middle = low + (high - low)/2;")
+                code.line(f"if ({of}[middle] < k)")
+                code.line("    low = middle + 1;")
+                code.line("else")
+                code.line("    high = middle;")
+            code.line(f"for (; low < {count} && {of}[low] == k; low++)")
+            code.line(f"    v[{entry.start} + {code.tables.name(indices)}[low]] += {code.text(1.0)};")
+
+    def _each_drawn(
+        self, code: Code, stream: Stream, tree: Tree, known: Mapping[str, Value], start: int, count: int
+    ) -> None:
+        """The lines that draw so many numbers, from ``start`` on in the vector of a step, by a formula of i and n."""
+        low, high = stream.key
         step = f"(uint32_t)(k + {self.state.drawn})" if self.state.drawn else "(uint32_t)k"
 
         def drawn(node: Draw, first: Value, second: Value) -> Value:
-            self.kinds.add(node.kind)
-            number = f"nv_{node.kind}(UINT32_C({low}), UINT32_C({high}), (uint32_t)i, {step}, {node.index})"
+            kind = "normal" if node.kind == "normal" else "uniform"
+            self.kinds.add(kind)
+            number = f"nv_{kind}(UINT32_C({low}), UINT32_C({high}), (uint32_t)i, {step}, {node.index})"
+            if node.kind == "poisson":
+                number = f"nv_poisson({code.text(first)}, {number})"
+                return code.let("d", f"(float){number}" if self.real == "float" else number)
             number = f"(float){number}" if self.real == "float" else number
             a, b = code.text(first), code.text(second)
             if node.kind == "uniform":
@@ -560,11 +604,10 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             drawn = f"({a}) + ({b})*{number}"
             return code.let("d", drawn if isinstance(second, float) and second >= 0 else f"({b}) < 0 ? NAN : {drawn}")
 
-        known: dict[str, Value] = {**noise.parameters, **{n: f"parameters[{slot}]" for n, slot in noise.slots.items()}}
-        known |= {"i": f"({self.real})i", "n": float(len(noise.members))}
-        with code.block(code.loop("i", len(noise.members))):
-            value = code.value(noise.expression, known, {}, drawn)
-            code.line(f"v[{noise.start} + i] = {code.text(value)};")
+        known = {**known, "i": f"({self.real})i", "n": float(count)}
+        with code.block(code.loop("i", count)):
+            value = code.value(tree, known, {}, drawn)
+            code.line(f"v[{start} + i] = {code.text(value)};")
 
     def _init(self) -> list[str]:
         """All members of the state."""

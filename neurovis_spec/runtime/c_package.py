@@ -221,9 +221,12 @@ def _cost(exported: Exported) -> str:
         if projection.kind == RULE:
             functions += _calls_a_step(projection.rule.definition) * len(projection.members)
     functions += _of_synapses(network)
-    functions += _calls(entry.expression for entry in network.inputs)
+    functions += sum(
+        _calls([one.expression]) * (one.size if one.indexed or one.is_drawn else 1) for one in network.inputs
+    )
     at_stages, stages = _integration(exported)
     drawn = sum(len(noise.members) for noise in network.noises)
+    drawn += sum(entry.size for entry in network.inputs if entry.is_drawn)
     lines = [
         f"- {plural(len(network.connections), 'connection')}: a multiplication and an addition each",
         *stages,

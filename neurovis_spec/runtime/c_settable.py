@@ -64,8 +64,11 @@ def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "p
 
             def drawn(node: Draw, first: Value, second: Value) -> Value:
                 assert draw is not None
-                number = code.text(_element(code, draw(node, np.float64(0.0), np.float64(1.0)), place))
+                standard = replace(node, kind="uniform") if node.kind == "poisson" else node
+                number = code.text(_element(code, draw(standard, np.float64(0.0), np.float64(1.0)), place))
                 low, high = code.text(first), code.text(second)
+                if node.kind == "poisson":
+                    return f"{'(float)' if code.real == 'float' else ''}nv_poisson({low}, {number})"
                 if node.kind == "uniform":
                     return f"(({low}) + (({high}) - ({low}))*{number})"
                 return f"(({high}) < 0 ? NAN : ({low}) + ({high})*{number})"

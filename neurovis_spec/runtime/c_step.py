@@ -215,13 +215,15 @@ class StepCode:
     def read(self) -> None:
         """The inputs that are expressions, those that are asked for (``reads``), into ``s``; ``odd`` as of a step."""
         code, network = self.code, self.network
-        expressions = [(number, one) for number, one in enumerate(network.inputs) if one.expression is not None]
+        expressions = [(number, one) for number, one in enumerate(network.inputs) if one.is_formula]
         if expressions:
             code.line(f"{code.real} odd = {code.text(0.0)};")
         for number, entry in expressions:
             with code.block(f"if (reads[{number}])"):
                 value = write_input(code, network, entry, "s")
-                code.line(f"odd += {value} - {value};")
+                if entry.indexed:
+                    code.line(code.loop("i", entry.size))
+                code.line(f"{'    ' * entry.indexed}odd += {value} - {value};")
 
     def write(self) -> None:
         """All operations in order."""
@@ -991,10 +993,17 @@ def _common_delay(delays: IntArray) -> int:
 
 def write_input(code: Code, network: Network, entry: Input, vector: str, clock: Mapping[str, Value] = _NO_CLOCK) -> str:
     """An input that is an expression, by the parameters as they are by now, into its places of the ``vector`` of all
-    inputs. Gives the identifier of its value. ``clock``: the time where it is not that of the step."""
+    inputs. Gives what its value is called; of one that is indexed that of number i. ``clock``: the time where it is not
+    that of the step."""
     assert entry.expression is not None
     slots: dict[str, Value] = {name: f"parameters[{slot}]" for name, slot in entry.slots.items()}
-    value = code.variable("n", code.value(entry.expression, {**network.parameters, **slots, **clock}))
+    known = {**network.parameters, **slots, **clock}
+    if entry.indexed:
+        with code.block(code.loop("i", entry.size)):
+            made = code.value(entry.expression, {**known, "i": f"({code.real})i", "n": float(entry.size)})
+            code.line(f"{vector}[{entry.start} + i] = {code.text(made)};")
+        return f"{vector}[{entry.start} + i]"
+    value = code.variable("n", code.value(entry.expression, known))
     code.line(code.loop("i", entry.size))
     code.line(f"    {vector}[{entry.start} + i] = {value};")
     return value

@@ -1,4 +1,4 @@
-"""Inputs: s[t] as one vector, from expressions, tables and what the caller supplies; behind them the noise.
+"""Inputs: s[t] as one vector, from expressions, tables, spikes and what the caller supplies; behind them the noise.
 
 In: a Network and the caller's values. Out: for each step the vector of all inputs. Expressions are *left* to a stepper
 that computes them itself, but for those in which something undefined may hide. Else they are evaluated a stretch of
@@ -12,13 +12,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import BoolArray, FloatArray
 from neurovis_spec.compiler.events.settable import table_of
-from neurovis_spec.compiler.network import Input, Network, Noise
+from neurovis_spec.compiler.network import Input, Network, Noise, Spikes
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.evaluate import evaluate, evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
@@ -35,6 +36,17 @@ _MOST_VALUES = 1 << 16
 
 class InputError(ValueError):
     """A value for an input that does not exist, has another size, or is no finite number."""
+
+
+class _Numbers(NamedTuple):
+    """What a formula gives a number for each of, at each step: what they are for and the name by which they are drawn,
+    how many there are, and the values and slots of the parameters that the formula reads."""
+
+    purpose: str
+    name: str
+    size: int
+    parameters: Mapping[str, float]
+    slots: Mapping[str, int]
 
 
 class InputReader:
@@ -69,6 +81,8 @@ class InputReader:
         #: rows are of two stretches
         self._most = 1 << (max(1, _MOST_VALUES // max(1, network.vector_size)).bit_length() - 1)
         self._steps = min(STRETCH, self._most)
+        #: the steps of spikes, by input
+        self._spikes = {one.name: one.spikes.steps(network.dt) for one in network.inputs if one.spikes is not None}
         #: the inputs that are left to the stepper, and whether these are all numbers of the vector
         self.left: frozenset[str] = frozenset()
         self.all_left = False
@@ -89,7 +103,7 @@ class InputReader:
         if not isinstance(stepper, Reading):
             return
         kept = {*self._supplied, *but, *(self.network.inputs[number].name for number in self._undefined)}
-        self.left = frozenset(one.name for one in self.network.inputs if one.expression is not None) - kept
+        self.left = frozenset(one.name for one in self.network.inputs if one.is_formula) - kept
         sizes = (one.size for one in self.network.inputs if one.name in self.left)
         self.all_left = sum(sizes) == self.network.vector_size
         self._left_beside = frozenset(), self.left
@@ -160,7 +174,7 @@ class InputReader:
             if entry.name in self._supplied and entry.name in self.network.held_inputs:
                 rows[:, self.network.held_inputs[entry.name]] = 1.0
         for noise in self.network.noises:
-            rows[:, noise.start : noise.start + len(noise.members)] = self._drawn(noise, noise.expression, steps)
+            rows[:, noise.start : noise.start + len(noise.members)] = self._noise(noise, noise.expression, steps)
         rows.flags.writeable = bool(self.left)
         self._first, self._rows = first, rows
         if self._on_rows is not None and not self.all_left:
@@ -173,11 +187,13 @@ class InputReader:
         hidden = np.zeros((len(steps), self.network.vector_size), dtype=np.bool_)
         for number, tree in self._undefined.items():
             entry = self.network.inputs[number]
-            values = np.broadcast_to(self._evaluated(entry, tree, steps), len(steps))
-            hidden[:, entry.start : entry.start + entry.size] = values.reshape(-1, 1) != 0
+            values = self._each(entry, tree, steps) if entry.indexed or entry.is_drawn else None
+            if values is None:
+                values = np.broadcast_to(self._evaluated(entry, tree, steps), len(steps)).reshape(-1, 1)
+            hidden[:, entry.start : entry.start + entry.size] = np.not_equal(values, 0)
         for number, tree in self._undefined_noise.items():
             noise = self.network.noises[number]
-            hidden[:, noise.start : noise.start + len(noise.members)] = np.not_equal(self._drawn(noise, tree, steps), 0)
+            hidden[:, noise.start : noise.start + len(noise.members)] = np.not_equal(self._noise(noise, tree, steps), 0)
         return hidden
 
     def _source(self, entry: Input, steps: npt.NDArray[np.int64]) -> FloatArray | float:
@@ -185,8 +201,12 @@ class InputReader:
         if table is not None:
             chosen: FloatArray = table[np.minimum(steps, len(table) - 1)]
             return chosen.reshape(len(steps), -1)
+        if entry.spikes is not None:
+            return self._counted(entry, entry.spikes, steps)
         if entry.expression is None:
             return 0.0
+        if entry.indexed or entry.is_drawn:
+            return self._each(entry, entry.expression, steps)
         if len(steps) > STRETCH:
             return np.broadcast_to(self._evaluated(entry, entry.expression, steps), len(steps)).reshape(-1, 1)
         within = int(steps[0]) % STRETCH
@@ -197,6 +217,19 @@ class InputReader:
             values = np.broadcast_to(self._evaluated(entry, entry.expression, stretch), (STRETCH,))
             kept = self._expressions[entry.name] = begin, np.asarray(values, dtype=np.float64)
         return kept[1][within : within + len(steps)].reshape(-1, 1)
+
+    def _counted(self, entry: Input, spikes: Spikes, steps: npt.NDArray[np.int64]) -> FloatArray:
+        """How many spikes of each number these steps have, which follow each other: (steps, size)."""
+        counts, first = np.zeros((len(steps), entry.size)), int(steps[0])
+        of = self._spikes[entry.name]
+        begin, end = np.searchsorted(of, (first, first + len(steps))).tolist()
+        np.add.at(counts, (of[begin:end] - first, spikes.indices[begin:end]), 1.0)
+        return counts
+
+    def _each(self, entry: Input, tree: Tree, steps: npt.NDArray[np.int64]) -> FloatArray | float:
+        """A formula of each number of an input, over a stretch of steps: (steps, size)."""
+        numbers = _Numbers("input", entry.name, entry.size, self.network.parameters, entry.slots)
+        return self._drawn(numbers, tree, steps)
 
     def _evaluated(self, entry: Input, tree: Tree, steps: npt.NDArray[np.int64]) -> FloatArray | float:
         """A formula of an input over these steps."""
@@ -217,15 +250,20 @@ class InputReader:
         start, size = self.network.settable.variables[table_of(number)]
         return np.broadcast_to(self._variables[start : start + size], (entry.table.size,)).reshape(entry.table.shape)
 
-    def _drawn(self, noise: Noise, tree: Tree, steps: npt.NDArray[np.int64]) -> FloatArray | float:
-        """A formula of a noise over a stretch of steps: the counter of a number is (i, 0, step, number of the draw)."""
-        stream = Stream(self.network.seed, "noise", noise.name)
-        n = len(noise.members)
-        i, step = np.arange(n).reshape(1, -1), steps.reshape(-1, 1)
+    def _noise(self, noise: Noise, tree: Tree, steps: npt.NDArray[np.int64]) -> FloatArray | float:
+        """A formula of a noise over a stretch of steps: (steps, members)."""
+        numbers = _Numbers("noise", noise.name, len(noise.members), noise.parameters, noise.slots)
+        return self._drawn(numbers, tree, steps)
+
+    def _drawn(self, of: _Numbers, tree: Tree, steps: npt.NDArray[np.int64]) -> FloatArray | float:
+        """A formula of some numbers over a stretch of steps: the counter of a number that is drawn is (i, 0, step,
+        number of the draw)."""
+        stream = Stream(self.network.seed, of.purpose, of.name)
+        i, step = np.arange(of.size).reshape(1, -1), steps.reshape(-1, 1)
         k, dt = step.astype(np.float64), self.network.dt
-        known: dict[str, float | FloatArray] = {**constants(dt), **noise.parameters, "k": k, "t": k * dt}
-        known |= {"i": i.astype(np.float64), "n": float(n)}
-        known |= self._set(noise.slots)
+        known: dict[str, float | FloatArray] = {**constants(dt), **of.parameters, "k": k, "t": k * dt}
+        known |= {"i": i.astype(np.float64), "n": float(of.size)}
+        known |= self._set(of.slots)
         step = step + self._drawn_before
 
         def draw(node: Draw, first: float | FloatArray, second: float | FloatArray) -> FloatArray:
@@ -243,8 +281,12 @@ def at_stage(network: Network, inputs: FloatArray, state: State, t: float) -> li
         if not result[held] and entry.expression is not None:
             known = {**constants(network.dt), **network.parameters, "k": float(state.k), "t": t}
             known |= {name: float(state.conditions.parameters[slot]) for name, slot in entry.slots.items()}
-            value = evaluate(entry.expression, known)
-            result[entry.start : entry.start + entry.size] = [value] * entry.size
+            if entry.indexed:
+                known["n"] = float(entry.size)
+                values = [evaluate(entry.expression, known | {"i": float(i)}) for i in range(entry.size)]
+            else:
+                values = [evaluate(entry.expression, known)] * entry.size
+            result[entry.start : entry.start + entry.size] = values
     return result
 
 

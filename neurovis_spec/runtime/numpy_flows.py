@@ -386,6 +386,8 @@ class _Stage:
                 read = names(entry.expression) & self.network.parameters.keys()
                 known = {name: self.code.constant(self.network.parameters[name]) for name in sorted(read)}
                 known |= {name: f"state.conditions.parameters[{slot}]" for name, slot in entry.slots.items()}
+                if entry.indexed:
+                    known |= {"i": self.code.constant(np.arange(float(entry.size))), "n": repr(float(entry.size))}
                 value = self.code.expression(entry.expression, known | {"t": "t"})
                 place = f"{entry.start}:{entry.start + entry.size}"
                 self.code.line(f"if not s[{held}]: {vector}[{place}] = {value}")

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, integers, reals
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.progress import Progress
@@ -171,6 +171,13 @@ def _compared(name: str, runs: list[FloatArray], why: str) -> StepError:
     return StepError(name, first, second, float(np.log2(first / second)) if first else -np.inf)
 
 
+def _input_per_step(entry: Input) -> str:
+    """Why what an input gives in a step does not follow its length; "" where it does."""
+    if entry.spikes is not None or entry.is_drawn:
+        return "an input that counts"
+    return "an input that reads k" if entry.expression is not None and "k" in names(entry.expression) else ""
+
+
 def _without_order(network: Network, models: Mapping[int, Definition]) -> dict[int, str]:
     """The neurons whose values do not follow the length of a step as those of a method do, and why: they, or one that
     reaches them, have something that is per step, or random."""
@@ -179,11 +186,11 @@ def _without_order(network: Network, models: Mapping[int, Definition]) -> dict[i
     why = {index: told for index, model in models.items() if (told := _per_step(model))}
     for noise in network.noises:
         why.update(dict.fromkeys(noise.members.tolist(), "noise"))
-    stepped = {index for one in network.inputs if one.expression is not None and "k" in names(one.expression)
+    stepped = {index: told for one in network.inputs if (told := _input_per_step(one))
                for index in range(one.start, one.start + one.size)}  # fmt: skip
     for port in dict.fromkeys(port.name for one in network.populations for port in one.ports):
-        fed = np.flatnonzero(np.isin(network.neurons.input_at(port), list(stepped)))
-        why.update(dict.fromkeys(fed.tolist(), "an input that reads k"))
+        given = network.neurons.input_at(port).tolist()
+        why.update({neuron: stepped[index] for neuron, index in enumerate(given) if index in stepped})
     following: dict[int, list[int]] = {}
     delays = connections.delays.whole()
     if connections.lags is not None:  # what is read between steps follows their length

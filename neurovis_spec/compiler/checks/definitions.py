@@ -224,14 +224,28 @@ def integrated(groups: Iterable[Built], bundles: Iterable[Bundle]) -> list[Integ
     return list(found.values())
 
 
-def check_dt(spec: Spec, included: Iterable[Library], needing: Iterable[Integrated], findings: Findings) -> None:
-    """Report a derivative in use where nothing says how long a step is."""
+def check_dt(
+    spec: Spec,
+    included: Iterable[Library],
+    needing: Iterable[Integrated],
+    sections: Iterable[Section],
+    findings: Findings,
+) -> None:
+    """Report a derivative in use, else an input that counts what comes in a step, where nothing says how long a step
+    is."""
     if "time" in spec.unknown or (spec.time is not None and (spec.time.dt or "dt" in spec.time.unknown)):
         return
     first_of: dict[tuple[Kind, str], Integrated] = {}
     for used in needing:
         first_of.setdefault((used.definition.kind, used.definition.name), used)
+    hint = "say it at the top, as in time: {dt: 0.1 ms}"
     if not first_of:
+        inputs = (model for section in sections for model in section.inputs.values())
+        counted = next((one for one in inputs if one.poisson or one.spikes), None)
+        if counted is not None:
+            what = "spikes come at times in seconds" if counted.spikes else "a rate is per second"
+            span = counted.source.entries[0].key.span
+            findings.error("dt-needed", span, f"{what}, and no 'dt' says how long a step is", hint)
         return
     one, *others = first_of.values()
     first = next((state.name for state in one.definition.flows), one.definition.given.name)
@@ -240,7 +254,6 @@ def check_dt(spec: Spec, included: Iterable[Library], needing: Iterable[Integrat
     if others:
         names = listed([f"'{other.definition.name}'" for other in others])
         message += f". Others that need it: {names}"
-    hint = "say it at the top, as in time: {dt: 0.1 ms}"
     findings.error("dt-needed", one.place_of(first, (spec, *included)), message, hint)
 
 

@@ -31,7 +31,7 @@ from neurovis_spec.compiler.events.settable import (
     bias_of,
     table_of,
 )
-from neurovis_spec.compiler.network import Located, Network, Noise
+from neurovis_spec.compiler.network import Located, Network
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Key, Owner
 from neurovis_spec.language.expressions.tree import Number
@@ -118,7 +118,8 @@ def make_settable(network: Network, slots: tuple[Slot, ...], found: Iterable[Loc
     bindings = [
         _binding(located, variables.get(located.array), len(arrays.get(located.array, ()))) for located in merged
     ]
-    bindings += [binding for noise in network.noises for binding in _of_noise(noise)]
+    drawn = [*(one.widths for one in network.noises), *(one.widths for one in network.inputs)]
+    bindings += [_of_width(width) for widths in drawn for width in widths]
     return Settable(slots, tuple(bindings), variables, frozen(np.concatenate(initial)))
 
 
@@ -157,12 +158,11 @@ def _binding(located: LocatedPart, variable: Variable | None, size: int) -> Bind
     )
 
 
-def _of_noise(noise: Noise) -> Iterator[Binding]:
-    """The spreads of a noise, none of which may become negative. They are computed in a run, so that their bindings
-    write nothing and only check."""
+def _of_width(width: ParameterFormula) -> Binding:
+    """A spread of a noise or a rate of an input, which must not become negative. It is computed in a run, so that its
+    binding writes nothing and only checks."""
     zero = ParameterFormula(Number(0.0), {})
-    for width in noise.widths:
-        yield Binding(width, weights=False, indices=NO_INDICES, array=NOISE, places=NO_INDICES, low=zero)
+    return Binding(width, weights=False, indices=NO_INDICES, array=NOISE, places=NO_INDICES, low=zero)
 
 
 def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: FloatColumn) -> FloatArray | None:

@@ -473,6 +473,6 @@ def _noise_of(formula: Formula, constants: Constants) -> Tree | Unknown:
     if tree is UNKNOWN or draws(tree):
         return tree
     message = "this noise draws nothing: it is the same at each run"
-    hint = "use normal(mean, deviation) or uniform(low, high); a constant belongs to 'bias'"
+    hint = "use normal(mean, deviation), uniform(low, high) or poisson(mean); a constant belongs to 'bias'"
     constants.findings.error("no-draw", formula.span, message, hint)
     return UNKNOWN

@@ -60,19 +60,19 @@ def _of_states(one: Built, members: IntArray) -> Iterator[Noise]:
 
 
 def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Constants) -> tuple[ParameterFormula, ...]:
-    """A finding where a deviation, or what ``uniform`` draws from, is known before the run and negative for any neuron.
-    A deviation that depends on the step, or a draw in a branch, which may not be taken, gives NaN in the run, and its
-    warning. Gives those of them that follow parameters of the run."""
+    """A finding where a deviation, what ``uniform`` draws from, or a mean of ``poisson``, is known before the run and
+    negative for any neuron. A deviation that depends on the step, or a draw in a branch, which may not be taken, gives
+    NaN in the run, and its warning. Gives those of them that follow parameters of the run."""
     following = []
     known: dict[str, Value] = {**constants.parameters, **CONSTANTS, "dt": constants.dt}
     known |= {"i": np.arange(count, dtype=np.float64), "n": float(count)}
     for draw in _always_drawn(tree):
-        parts = (draw.first, draw.second) if draw.kind == "uniform" else (draw.second,)
+        parts = {"normal": (draw.second,), "poisson": (draw.first,)}.get(draw.kind, (draw.first, draw.second))
         if all(names(part) <= known.keys() and not draws(part) for part in parts):
-            width = width_of(draw, *(evaluate_array(part, known) for part in (parts[0], draw.second)))
+            width = width_of(draw, *(evaluate_array(part, known) for part in (parts[0], parts[-1])))
             if np.less(width, 0).any():
                 constants.refuse_draw(formula, draw, float(np.min(width)))
-            tree = draw.second if draw.kind == "normal" else Chain(("-",), (draw.second, draw.first))
+            tree = parts[0] if len(parts) == 1 else Chain(("-",), (draw.second, draw.first))
             bound = constants.bound(tree, {name: known[name] for name in _NOISE.sees if name in known})
             if bound.slots:
                 following.append(bound)

@@ -15,7 +15,8 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 
-_LN2_HIGH, _LN2_LOW = float.fromhex("0x1.62e42feep-1"), float.fromhex("0x1.a39ef35793c76p-33")
+#: ln 2 in two parts, of which the first has zeros at its end
+LN2_HIGH, LN2_LOW = float.fromhex("0x1.62e42feep-1"), float.fromhex("0x1.a39ef35793c76p-33")
 #: the bits of √½, rounded, and those of a number's fraction
 _ROOT_HALF, _FRACTION = int(np.float64(math.sqrt(0.5)).view(np.int64)), (1 << 52) - 1
 _LOG = (
@@ -60,10 +61,10 @@ def log(x: FloatArray) -> FloatArray:
     # k·ln 2 (high) − ((half − (s·(half + r) + k·ln 2 (low))) − f)
     r += half
     r *= s
-    r += k * _LN2_LOW
+    r += k * LN2_LOW
     half -= r
     half -= f
-    k *= _LN2_HIGH
+    k *= LN2_HIGH
     k -= half
     return k.reshape(np.shape(x))
 
@@ -112,6 +113,6 @@ def constants() -> dict[str, str]:
     lists = {"LOG": _LOG, "SIN": _SIN, "COS": _COS}
     counts = {f"{name}_COUNT": str(len(values)) for name, values in lists.items()}
     texts = {f"{{{name}}}": f"{{{', '.join(map(repr, values))}}}" for name, values in lists.items()}
-    numbers = {"LN2_LOW": _LN2_LOW, "LN2_HIGH": _LN2_HIGH, "TAU": math.tau, "TWO_TO_MINUS_53": 2.0**-53}
+    numbers = {"LN2_LOW": LN2_LOW, "LN2_HIGH": LN2_HIGH, "TAU": math.tau, "TWO_TO_MINUS_53": 2.0**-53}
     integers = {"ROOT_HALF": f"INT64_C({_ROOT_HALF})", "FRACTION": f"UINT64_C({_FRACTION})"}
     return {**counts, **texts, **{name: repr(value) for name, value in numbers.items()}, **integers}

@@ -32,6 +32,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import Dependent, ParameterFormula, Part, Slot, slots_named
 from neurovis_spec.compiler.values.draws import Stream
+from neurovis_spec.compiler.values.poisson import LARGEST_MEAN
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, DRAWS, FUNCTIONS, GIVEN, meaning
@@ -377,15 +378,19 @@ class Constants:
         return result
 
     def refuse_draw(self, formula: Formula, draw: Draw, second: float) -> None:
-        """The finding about a draw from ``normal`` whose deviation is negative, or from ``uniform`` whose upper end is
-        below the lower one by ``second``."""
+        """The finding about a draw from ``normal`` whose deviation is negative, from ``uniform`` whose upper end is
+        below the lower one by ``second``, or from ``poisson`` with what is no mean."""
         place = formula.node.at(draw.second.start, draw.second.end)
         message = f"the deviation of a normal distribution must be at least 0, this is {second:.15g}"
-        hint = "normal(mean, deviation): the mean comes first"
+        hint: str | None = "normal(mean, deviation): the mean comes first"
         if draw.kind == "uniform":
             below = f"{-second:.15g}" if second > -math.inf else "far"
             message = f"the upper end of a uniform distribution is {below} below the lower one"
             hint = "uniform(low, high): the lower end comes first"
+        if draw.kind == "poisson":
+            place = formula.node.at(draw.first.start, draw.first.end)
+            message = f"the mean of a Poisson distribution must be from 0 to {LARGEST_MEAN:,.0f}"
+            hint = None
         self.findings.error("out-of-range", place, message, hint)
 
     def value(
@@ -481,5 +486,8 @@ class _Drawing:
 
 
 def width_of(draw: Draw, first: Value, second: Value) -> Value:
-    """How wide a distribution is, which must not be negative: the deviation, or from the lower end to the upper."""
+    """How wide a distribution is, which must not be negative: the deviation, or from the lower end to the upper; of
+    ``poisson`` how far the mean is inside of what it may be."""
+    if draw.kind == "poisson":
+        return np.minimum(first, LARGEST_MEAN - first)
     return second if draw.kind == "normal" else second - first

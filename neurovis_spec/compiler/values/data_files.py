@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from neurovis_spec.compiler.limits import amount
-from neurovis_spec.diagnostics import Findings
+from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.data.files import CellError, NamedFile, Room, Table, read_edges, read_table
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
@@ -98,6 +98,14 @@ class Files:
         """The table of an input: of any size, beside whose path no key can stand."""
         reference = FileReference(path, None, path.span)
         return self.table(reference, full="an input needs a number everywhere", keyed=False)
+
+    def spikes_at(self, path: Located[str]) -> Table | Unknown:
+        """The table of a ``.csv`` file of spikes, a row each."""
+        if not path.value.lower().endswith(".csv"):
+            message = f"spikes are read from a .csv file, not from '{shorten(path.value)}'"
+            self.findings.error("file-format", path.span, message)
+            return UNKNOWN
+        return self.table(FileReference(path, None, path.span), full="a spike needs a number everywhere", keyed=False)
 
     def edges(self, reference: FileReference, most: int | None = None) -> EdgeTable | Unknown:
         """The edges of a ``.csv`` file, at most so many."""

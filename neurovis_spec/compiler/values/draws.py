@@ -6,7 +6,8 @@ Dror and Shaw, Parallel random numbers: as easy as 1, 2, 3 (SC 2011).
 
 Exactly: the key is the first 8 bytes, little-endian, of the SHA-256 of ``SEED/PURPOSE/NAME`` (UTF-8, the seed in
 decimal), the low word first. A block is four words w0 … w3 of 32 bits. A uniform number is ⌊w0/2^5⌋·2^26 + ⌊w1/2^6⌋
-over 2^53, in [0, 1); a normal one comes from two such, of w0 w1 and of w2 w3, by ``box_muller.normal``.
+over 2^53, in [0, 1); a normal one comes from two such, of w0 w1 and of w2 w3, by ``box_muller.normal``; a count of the
+Poisson distribution from one, by ``poisson.counts``.
 """
 
 from __future__ import annotations
@@ -16,13 +17,14 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray, width
-from neurovis_spec.compiler.values import box_muller
+from neurovis_spec.compiler.values import box_muller, poisson
+from neurovis_spec.language.expressions.tree import DrawKind
 
 WordArray: TypeAlias = npt.NDArray[np.uint32]
 LongArray: TypeAlias = npt.NDArray[np.uint64]
@@ -102,9 +104,10 @@ def _word(part: Indices) -> LongArray:
 class Stream:
     """The numbers of one purpose and name under a seed.
 
-    The purpose is one of ``weight``, ``centre``, ``edges``, ``delay``, ``bias``, ``initial``, ``noise``; the name that
-    of the group with the path of its instance (``left1.K``), or that of the entry behind the path of the instance that
-    declares it (``left1/K -> O``; an entry ``left1.K -> O`` around the instance draws by itself).
+    The purpose is one of ``weight``, ``centre``, ``edges``, ``delay``, ``bias``, ``initial``, ``noise``,
+    ``input``; the name that of the group or input with the path of its instance (``left1.K``), or that of the entry
+    behind the path of the instance that declares it (``left1/K -> O``; an entry ``left1.K -> O`` around the instance
+    draws by itself).
 
     >>> Stream(7, "weight", "K -> O").uniform(0, np.arange(3), 0, 0).round(6)
     array([0.091661, 0.668837, 0.808927])
@@ -150,16 +153,18 @@ class Stream:
 
     def drawn(
         self,
-        kind: Literal["normal", "uniform"],
+        kind: DrawKind,
         first: Value,
         second: Value,
         counter: tuple[Index, Index, Index, Index],
     ) -> FloatArray:
-        """``normal(first, second)``: mean and deviation; or ``uniform(first, second)``: from low to below high. The
-        counter is (i, j, step, draw).
+        """``normal(first, second)``: mean and deviation; ``uniform(first, second)``: from low to below high; or
+        ``poisson(first)``: the mean. The counter is (i, j, step, draw).
 
-        NaN where a deviation is negative: no distribution has one.
+        NaN where a deviation is negative, or that is no mean: no distribution has one.
         """
+        if kind == "poisson":
+            return poisson.counts(first, self.uniform(*counter))
         if kind == "normal":
             drawn = np.asarray(first + second * self.normal(*counter))
             return np.where(np.less(second, 0), np.nan, drawn) if np.less(second, 0).any() else drawn

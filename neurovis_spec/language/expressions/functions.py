@@ -37,9 +37,10 @@ GIVEN: Final[Mapping[str, str]] = {
     "dt": "The seconds a step takes (time.dt, by default 1).",
     "k": "The step of the run, from 0; in inputs, noise and definitions, which are worked out at each step.",
     "t": "The seconds of the run, k·dt; in inputs, noise and definitions, which are worked out at each step.",
-    "i": "The index from 0: of a neuron in its group; in a connection, of the source in its reference.",
+    "i": "The index from 0: of a neuron in its group, of a number in its input; in a connection, of the source "
+    "in its reference.",
     "j": "In a connection, the index from 0 of the target in its reference.",
-    "n": "The number of neurons of the group; a connection has n_from and n_to.",
+    "n": "How many neurons the group, or numbers the input, has; a connection has n_from and n_to.",
     "number": "In a label within a module, the number of the instance: 1 of left1, and where there is only one.",
     "n_from": "In a connection, the number of sources.",
     "n_to": "In a connection, the number of targets.",
@@ -514,18 +515,20 @@ def rows_of(node: Tree) -> Iterator[Operation]:
 
 
 class Draws(NamedTuple):
-    """What draws a random number from two arguments: how it is written, in a finding and in the manual, and the words
-    of this."""
+    """What draws a random number from so many arguments: how it is written, in a finding and in the manual, and the
+    words of this."""
 
     usage: str
     brief: str
     about: str
+    arity: int = 2
 
 
 #: The functions that draw.
 DRAWS: Mapping[str, Draws] = MappingProxyType({
     "normal": Draws("normal(mean, deviation)", "normal(mean, sd)", "A normally distributed random number."),
     "uniform": Draws("uniform(low, high)", "uniform(low, high)", "An evenly distributed random number."),
+    "poisson": Draws("poisson(mean)", "poisson(mean)", "A Poisson distributed random number.", 1),
 })  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
-from typing import Literal, TypeAlias, cast
+from typing import TypeAlias, cast
 
 from neurovis_spec.language.expressions import mistakes
 from neurovis_spec.language.expressions.functions import DRAWS, FUNCTIONS
@@ -25,6 +25,7 @@ from neurovis_spec.language.expressions.tree import (
     ChainOperator,
     Conditional,
     Draw,
+    DrawKind,
     ExpressionError,
     Name,
     Number,
@@ -58,9 +59,9 @@ def parse(
 ) -> Tree:
     """The tree of an expression. Raises ExpressionError.
 
-    ``random`` allows ``normal(m, s)`` and ``uniform(a, b)``, which become Draws numbered from 0 as they are written;
-    ``extra_functions`` are functions of this place besides those of all expressions, with their arities, which become
-    Calls; ``naming`` says what names there may be beside plain ones, such as ``legs[3]`` or ``pre.v``.
+    ``random`` allows ``normal(m, s)``, ``uniform(a, b)`` and ``poisson(m)``, which become Draws numbered from 0 as they
+    are written; ``extra_functions`` are functions of this place besides those of all expressions, with their arities,
+    which become Calls; ``naming`` says what names there may be beside plain ones, such as ``legs[3]`` or ``pre.v``.
 
     >>> parse("-x^2")
     Unary(operator='-', operand=Binary(operator='^', left=Name(name='x', start=1, end=2), \
@@ -261,8 +262,9 @@ class Parser:
         if not self.check_call(name, arity, len(arguments), end):
             return Call(name.text, tuple(arguments), name.start, end)
         if drawn:
-            kind = cast(Literal["normal", "uniform"], name.text)
-            return Draw(kind, arguments[0], arguments[1], index, name.start, end)
+            first, *others = arguments
+            second = others[0] if others else Number(0.0, end, end)
+            return Draw(cast(DrawKind, name.text), first, second, index, name.start, end)
         return Call(name.text, tuple(arguments), name.start, end)
 
     def arity(self, name: str) -> Arity | None:
@@ -271,7 +273,7 @@ class Parser:
             return self.extra_functions[name], self.extra_functions[name]
         if name in FUNCTIONS:
             return FUNCTIONS[name].least, FUNCTIONS[name].most
-        return (2, 2) if name in DRAWS else None
+        return (DRAWS[name].arity, DRAWS[name].arity) if name in DRAWS else None
 
     def check_call(self, name: Token, arity: Arity | None, given: int | None, end: int) -> bool:
         """Whether a function may be called here with so many arguments (None where that is not known); what is wrong is

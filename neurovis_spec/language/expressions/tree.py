@@ -181,11 +181,16 @@ class Call:
         return Call(self.function, parts, self.start, self.end)
 
 
+#: What draws.
+DrawKind: TypeAlias = Literal["normal", "uniform", "poisson"]
+
+
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """``normal(m, s)`` or ``uniform(a, b)``; ``index`` numbers the draws of one expression from 0."""
+    """``normal(m, s)``, ``uniform(a, b)`` or ``poisson(m)``, which has 0 for the second; ``index`` numbers the draws of
+    one expression from 0."""
 
-    kind: Literal["normal", "uniform"]
+    kind: DrawKind
     first: Tree
     second: Tree
     index: int

@@ -1,0 +1,148 @@
+"""Spikes at given times, from a file or from lists in the spec.
+
+In: the ``spikes`` of an input. Out: the input with Spikes; findings at the times, or at the cells of the file, that are
+none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from neurovis_spec.arrays import BoolArray, FloatArray, IntArray, frozen
+from neurovis_spec.compiler.limits import PATIENCE, plural
+from neurovis_spec.compiler.network import Input, Spikes
+from neurovis_spec.compiler.values.cells import Cells, cells_of, values_of
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.compiler.values.data_files import Files
+from neurovis_spec.diagnostics import Findings, listed, shorten
+from neurovis_spec.language.data.table import Table, printable
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.sections import InputModel, SpikesModel
+from neurovis_spec.language.units import TIMES
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
+from neurovis_spec.language.yaml.source import AnyList
+from neurovis_spec.likeness import suggest
+
+_NEGATIVE = "a spike is at 0 or later, this is at {:.15g}"
+
+
+def by_spikes(
+    bare: Input, sized: Input | Unknown, model: InputModel, spikes: SpikesModel, constants: Constants, files: Files
+) -> Input | Unknown:
+    """The input with its spikes: that of its size, for a file, or ``bare``, which has a number for each list."""
+    findings = constants.findings
+    unit = None if "time" in spikes.unknown else "s" if spikes.time is None else spikes.time.value
+    if spikes.file is not None:
+        if model.size is None and "size" not in model.unknown:
+            message = "how many numbers the input has, no file of spikes says, as some may have none"
+            findings.error("missing-key", spikes.file.span, message, "write size: N beside 'spikes'")
+            sized = UNKNOWN
+        found = _from_file(spikes.file, spikes, sized, files)
+        size = UNKNOWN if sized is UNKNOWN else sized.size
+    elif spikes.times is not None:
+        found, size = _from_lists(spikes.times, constants), len(spikes.times)
+        if model.size is not None and sized is not UNKNOWN and sized.size != size:
+            message = f"{plural(size, 'list')} of times for {plural(sized.size, 'number')}"
+            findings.error("wrong-size", spikes.times.span, message, "remove 'size', or give a list for each")
+            return UNKNOWN
+    else:
+        if spikes.unknown.isdisjoint(("file", "times")):
+            hint = "write {file: PATH} or {times: [[0.1, 0.2], []]}"
+            findings.error("missing-key", spikes.source.span, "'spikes' needs a 'file' or 'times'", hint)
+        return UNKNOWN
+    if found is UNKNOWN or size is UNKNOWN or unit is None or spikes.contradictory:
+        return UNKNOWN
+    return replace(bare, size=size, spikes=_sorted(_in_seconds(found[0], TIMES[unit]), found[1]))
+
+
+def _in_seconds(times: FloatArray, factor: Fraction) -> FloatArray:
+    """Times in seconds, each rounded once."""
+    return times * factor.numerator if factor >= 1 else times / factor.denominator
+
+
+def _sorted(times: FloatArray, indices: IntArray) -> Spikes:
+    order = np.lexsort((indices, times))
+    return Spikes(frozen(times[order]), frozen(indices[order]))
+
+
+def _from_lists(node: AnyList, constants: Constants) -> tuple[FloatArray, IntArray] | Unknown:
+    """The times in lists, and of which list each is."""
+    findings = constants.findings
+    if not len(node):
+        findings.error("wrong-size", node.span, "an input needs at least one list of times, which may be empty")
+        return UNKNOWN
+    cells = cells_of(node, findings, "a list of times", gaps=False)
+    if cells is UNKNOWN:
+        return UNKNOWN
+    with constants.following() as parts:
+        times = values_of(cells, np.arange(len(cells.kinds)), constants)
+    constants.depend_on(parts)  # when spikes come cannot change in a run
+    if times is UNKNOWN or cells.failed or _negative_in_lists(cells, times, findings):
+        return UNKNOWN
+    return times, cells.rows()
+
+
+def _negative_in_lists(cells: Cells, times: FloatArray, findings: Findings) -> bool:
+    wrong = np.flatnonzero(times < 0).tolist()
+    for cell in wrong[:PATIENCE]:
+        findings.error("out-of-range", cells.node(cell).span, _NEGATIVE.format(times[cell]))
+    return bool(wrong)
+
+
+def _from_file(
+    path: Located[str], spikes: SpikesModel, sized: Input | Unknown, files: Files
+) -> tuple[FloatArray, IntArray] | Unknown:
+    """The times of a file, and of which number of the input each is."""
+    table = files.spikes_at(path)
+    if table is UNKNOWN:
+        return UNKNOWN
+    written = spikes.columns
+    columns = [
+        _column(table, path, key, None if written is None else getattr(written, key), files.findings)
+        for key in ("time", "index")
+    ]
+    if UNKNOWN in columns or (written is not None and written.unknown) or "columns" in spikes.unknown:
+        return UNKNOWN
+    found = [(column, table.values[:, column]) for column in columns if column is not UNKNOWN]
+    (time, times), (index, indices) = found
+    within = np.inf if sized is UNKNOWN else sized.size
+
+    def is_index(value: float) -> str:
+        if not value.is_integer() or value < 0:
+            return f"numbers of the input are counted 0, 1, 2, …, this is {value:.15g}"
+        return f"the input has {plural(int(within), 'number')}, counted from 0; this is {value:.15g}"
+
+    checks: tuple[tuple[int, BoolArray, Callable[[float], str], FloatArray], ...] = (
+        (time, times < 0, _NEGATIVE.format, times),
+        (index, (indices < 0) | (indices != np.floor(indices)) | (indices >= within), is_index, indices),
+    )
+    for column, wrong, told, values in checks:
+        for row in np.flatnonzero(wrong)[:PATIENCE].tolist():
+            message = f"row {row + 2}, column {column + 1} of the file: {told(float(values[row]))}"
+            files.findings.error("out-of-range", path.span, message, key=(row, column))
+    if any(wrong.any() for _, wrong, _, _ in checks):
+        return UNKNOWN
+    return times, indices.astype(np.int64)
+
+
+def _column(
+    table: Table, path: Located[str], key: str, written: Located[str] | None, findings: Findings
+) -> int | Unknown:
+    """Where the column of the times, or of the indices, stands in a file."""
+    if table.header is None:
+        message = "the first row of a file of spikes names its columns: time,index"
+        findings.error("file-format", path.span, message)
+        return UNKNOWN
+    wanted = key if written is None else written.value
+    if wanted in table.header:
+        return table.header.index(wanted)
+    span = path.span if written is None else written.span
+    there = listed([f"'{printable(name)}'" for name in table.header])
+    hint = suggest(wanted, table.header) or (f"write columns: {{{key}: NAME}}" if written is None else None)
+    message = f"the file has no column '{shorten(wanted)}'; its columns are {there}"
+    findings.error("file-format", span, message, hint)
+    return UNKNOWN
