@@ -23,6 +23,7 @@ from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen, Source, Turned
 from neurovis_spec.live.turns import Lesion, Mend, Set
 from neurovis_spec.live.view import View
 from neurovis_spec.runtime.columns import Numbers, Probe, columns_of, recording_of
+from neurovis_spec.runtime.fitting import with_spikes
 from neurovis_spec.runtime.names import names_of
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_parts
@@ -139,7 +140,8 @@ def recording(network: Network, told: Told) -> bytes:
     )
     numbers = Numbers(np.array([one.snapshot.step for one in seen], np.int64), rows)
     after = replace(told.after, weights=told.after.weights[changing])
-    return _npz(recording_of(turned, columns, numbers, told.after.weights, after, told.backend))
+    made = recording_of(turned, columns, numbers, told.after.weights, after, told.backend)
+    return _npz(with_spikes(made, turned))
 
 
 def _known(values: Sequence[FloatArray | None]) -> list[FloatArray]:

@@ -55,7 +55,7 @@ def frame(compiled: CompiledNetwork, backend: str = "") -> Recording:
     """A recording without rows, to which received activities and weights are added: it has the names, connections and
     hash of the network, and the name of the backend, where that runs here."""
     network = compiled.network
-    columns = replace(columns_of(network), probe=Probe((), ()), outputs={})
+    columns = replace(columns_of(network), probe=Probe((), ()), outputs={}, spiking=None)
     return replace(empty_recording(network, columns, compiled.simulator("reference").state()), backend=backend)
 
 

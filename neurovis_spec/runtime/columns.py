@@ -1,4 +1,4 @@
-"""Columns: what of each step is kept, which are activities, changing weights and states of models and rules.
+"""Columns: what of each step is kept, which are activities, changing weights and states of models and rules; and who spikes.
 
 In: a Network, and what is wanted of it (Keep). Out: Columns: the indices to take, and a Probe that reads states; a
 Recording of the rows that were kept.
@@ -7,21 +7,23 @@ Recording of the rows that were kept.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Located, Network
-from neurovis_spec.compiler.program import SYNAPSE, Definition, Each, Owner
+from neurovis_spec.compiler.program import SPIKE, SYNAPSE, Definition, Each, Owner
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_neurons, find_states
 from neurovis_spec.runtime.rows import After, Rows, Widths
+from neurovis_spec.runtime.spikes import Fired
 from neurovis_spec.runtime.state import State
 
 
@@ -105,11 +107,63 @@ class Probe:
             found[self.signals] = signals.ctypes.data + signals.strides[0] * self.joined
         return found
 
+    def beside(self, other: Probe) -> Probe:
+        """A probe of its own columns, and behind them those of another one, which reads no signals."""
+        behind = (replace(read, columns=read.columns + len(self.names)) for read in other.reads)
+        return replace(self, names=(*self.names, *other.names), reads=(*self.reads, *behind))
+
     def now(self, state: State, signals: FloatArray | None = None) -> FloatArray:
         """What ``read`` gives as an array of its own."""
         row = np.empty(len(self.names))
         self.read(state, row, signals)
         return row
+
+
+@dataclass(frozen=True, eq=False)
+class Spiking:
+    """Which neurons of a network spike, and what tells it after a step: of some the activity, of those whose activity
+    is something else the state that ``probe`` reads; both ascending. A spike is what a model with a ``spike`` block
+    fires, or, of a model that says ``spikes: true``, an activity that is not 0."""
+
+    by_activity: IntArray
+    by_state: IntArray
+    probe: Probe
+
+    def __bool__(self) -> bool:
+        """Whether any do."""
+        return len(self.by_activity) + len(self.by_state) > 0
+
+    @cached_property
+    def neurons(self) -> IntArray:
+        """All that do, ascending."""
+        return np.union1d(self.by_activity, self.by_state)
+
+    def now(self, state: State) -> IntArray:
+        """Those that have fired in the last step, ascending."""
+        fired = self.by_activity[_fire(state.activity[self.by_activity])]
+        if not len(self.by_state):
+            return fired
+        active = (self.probe.now(state) != 0) & ~state.conditions.lesioned_neurons[self.by_state]
+        return np.sort(np.concatenate([fired, self.by_state[active]]))
+
+    def of_rows(self, first: int, activity: FloatArray, spikes: FloatArray, lesioned: npt.NDArray[np.bool_]) -> Fired:
+        """Those that have fired in some steps from ``first`` on: by the activities (steps, len(by_activity)), by
+        what the probe reads (steps, len(by_state)), but for neurons that were ``lesioned`` (n,) meanwhile."""
+        active = _fire(activity)
+        steps, places = np.nonzero(active)
+        neurons = self.by_activity[places]
+        if len(self.by_state):
+            more, places = np.nonzero((spikes != 0) & ~lesioned[self.by_state])
+            steps, neurons = np.concatenate([steps, more]), np.concatenate([neurons, self.by_state[places]])
+            order = np.lexsort((neurons, steps))
+            steps, neurons = steps[order], neurons[order]
+        return Fired(steps + first, neurons, first, first + len(activity))
+
+
+def _fire(activity: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which activities are a spike; what is no number is none."""
+    result: npt.NDArray[np.bool_] = (activity != 0) & (activity == activity)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +178,8 @@ class Columns:
     probe: Probe
     #: for each output that is states, their columns, and whether a single one is meant
     outputs: dict[str, tuple[tuple[int, ...], bool]]
+    #: whose spikes are, at every step; None where that is not known
+    spiking: Spiking | None = None
     spec: str = ""
     #: the names of what the body senses, and how its pose is drawn; None where there is none
     sensors: tuple[str, ...] | None = None
@@ -155,11 +211,13 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
         states.update(dict.fromkeys(singles(one for one in network.sent if of_connections or len(one.neurons))))
     for reference in keep.states:
         states.update(dict.fromkeys(singles(find_states(network, reference, names))))
+    neurons = _neurons(keep.neurons, names, len(network.neurons))
     return Columns(
-        neurons=_neurons(keep.neurons, names, len(network.neurons)),
+        neurons=neurons,
         weights=network.changing if keep.weights else network.changing[:0],
         probe=_probe(network, list(states)),
         outputs=outputs,
+        spiking=spiking_of(network, neurons),
         spec=keep.spec,
         sensors=None if body is None else body.sensor_names,
         skeleton=None if body is None else body.skeleton,
@@ -172,6 +230,21 @@ def _neurons(references: Sequence[str], names: Names | None, count: int) -> IntA
         return None
     indices = np.array(sorted(find_neurons(" + ".join(references), names)), dtype=np.int64)
     return None if len(indices) == count else indices
+
+
+def spiking_of(network: Network, neurons: IntArray | None = None) -> Spiking:
+    """Which neurons of a network spike, or of some of its neurons."""
+    spikes, states = (np.zeros(len(network.neurons), np.bool_) for _ in range(2))
+    for group in network.neurons.groups:
+        spikes[group.start : group.start + group.count] = group.spikes
+    for population in network.populations:
+        states[population.members] = population.model.definition.fires
+    if neurons is not None:
+        others = np.delete(np.arange(len(network.neurons)), neurons)
+        spikes[others] = states[others] = False
+    by_state = np.flatnonzero(states & ~spikes)
+    asked = [StateOf.of("neuron", SPIKE, by_state)] if len(by_state) else []
+    return Spiking(np.flatnonzero(spikes), by_state, probe_of(network, asked))
 
 
 def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:
@@ -225,6 +298,8 @@ class Numbers:
 
     step: IntArray
     rows: Rows
+    #: the spikes of all steps; None where these were not noted
+    fired: Fired | None = None
 
 
 def recording_of(
@@ -234,7 +309,7 @@ def recording_of(
     that stay."""
     connections = network.connections
     names, rows, ranks = names_of(network), numbers.rows, _ranks(network)
-    return Recording(
+    recording = Recording(
         activity=rows.activity,
         neurons=network.neurons.names,
         weights=rows.weights,
@@ -267,6 +342,9 @@ def recording_of(
         skeleton=columns.skeleton,
         backend=backend,
     )
+    if numbers.fired is None or not columns.spiking:
+        return recording
+    return recording.with_fired(numbers.fired, columns.spiking.neurons)
 
 
 def _ranks(network: Network) -> IntArray:

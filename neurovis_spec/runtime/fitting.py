@@ -12,10 +12,11 @@ import numpy as np
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.columns import Columns, Keep, Numbers, Probe, columns_of, recording_of
+from neurovis_spec.runtime.columns import Columns, Keep, Numbers, Probe, columns_of, recording_of, spiking_of
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.rows import After
+from neurovis_spec.runtime.spikes import Fired
 
 
 def fitted(recording: Recording, network: Network) -> Recording:
@@ -25,12 +26,31 @@ def fitted(recording: Recording, network: Network) -> Recording:
     sources, targets = network.connections.sources.whole(), network.connections.targets.whole()
     same_neurons = recording.neurons == network.neurons.names
     if same_neurons and np.array_equal(recording.sources, sources) and np.array_equal(recording.targets, targets):
-        return recording
+        return with_spikes(recording, network)
     table = of_table(recording, network)
     if table is None:
         whose = f"{recording.network or 'unnamed'}, {plural(len(recording.neurons), 'neuron')}"
         raise RecordingError(f"the recording is of another network ({whose})")
-    return table
+    return with_spikes(table, network)
+
+
+def with_spikes(recording: Recording, network: Network) -> Recording:
+    """A recording that holds no spikes with those that its rows tell, of the neurons of which they tell them: by their
+    activities, or by the state, where that was recorded."""
+    spiking = spiking_of(network, recording.recorded)
+    if recording.spiking is not None or not spiking or not len(recording):
+        return recording
+    place = {name: column for column, name in enumerate(recording.state_names)}
+    known = [name in place for name in spiking.probe.names]
+    columns = [place[name] for name in spiking.probe.names if name in place]
+    told = replace(spiking, by_state=spiking.by_state[known])
+    by_activity = spiking.by_activity
+    if recording.recorded is not None:
+        by_activity = np.searchsorted(recording.recorded, by_activity)
+    nobody = np.zeros(len(network.neurons), np.bool_)
+    fired = told.of_rows(0, recording.activity[:, by_activity], recording.states[:, columns], nobody)
+    steps = Fired(recording.step[fired.steps], fired.neurons, int(recording.step[0]), int(recording.step[-1]) + 1)
+    return recording.with_fired(steps, told.neurons)
 
 
 def of_table(recording: Recording, network: Network) -> Recording | None:

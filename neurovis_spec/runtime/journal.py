@@ -28,11 +28,14 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.rows import KINDS, After, Rows, Steps, Widths
+from neurovis_spec.runtime.spikes import Fired, SpikeLog
 
 MAGIC: Final = b"neurovis run 2\n"
 #: the heads of the frame and of a chunk
 _FRAME, _CHUNK = struct.Struct("<QQQI"), struct.Struct("<4sQQI")
 _MARK = b"rows"
+#: of a chunk's text: the spikes since the chunk before
+_FIRED = "fired"
 _NUMBER, _PIECE = 8, 1 << 20
 
 
@@ -51,6 +54,7 @@ class JournalWriter:
                 "set_parameters": dict(after.set_parameters),
                 "lesioned_neurons": after.lesioned_neurons.tolist(),
                 "lesioned_connections": after.lesioned_connections.tolist(),
+                **_told(after.fired),
             }
         ).encode()
         parts = [*(_bytes(array) for array in rows), _bytes(after.weights), memoryview(text)]
@@ -58,6 +62,21 @@ class JournalWriter:
         for part in parts:
             total = crc32(part, total)
         _write(self._file, _CHUNK.pack(_MARK, len(rows.activity), len(text), total), *parts)
+
+
+def _told(fired: Fired) -> dict[str, object]:
+    """What fired since the chunk before, where steps were made in which that was looked for."""
+    if fired.stop <= fired.first:
+        return {}
+    steps, neurons, first, stop = fired
+    return {_FIRED: [steps.tolist(), neurons.tolist(), first, stop]}
+
+
+def _fired(text: bytes, log: SpikeLog) -> None:
+    """Put what fired since the chunk before to the rest."""
+    if _FIRED.encode() in text:
+        steps, neurons, first, stop = json.loads(text)[_FIRED]
+        log.extend(Fired(np.array(steps, np.int64), np.array(neurons, np.int64), int(first), int(stop)))
 
 
 def _bytes(numbers: FloatArray) -> memoryview:
@@ -97,6 +116,8 @@ class Journal:
     after: dict[str, object]
     #: (p,) the changing weights after the last step; none without a chunk
     weights: FloatArray
+    #: the spikes of all chunks
+    fired: Fired
 
     @property
     def rows(self) -> int:
@@ -148,7 +169,7 @@ def read_journal(file: FileIO, columns: Callable[[bytes], tuple[Widths, int]]) -
     widths, p = columns(frame)
     width = sum(widths)
     chunks: list[_Chunk] = []
-    offset, text, last = len(head) + length, b"{}", b""
+    offset, text, last, log = len(head) + length, b"{}", b"", SpikeLog(first)
     while offset + _CHUNK.size <= size:
         file.seek(offset)
         mark, rows, text_length, checksum = _CHUNK.unpack(file.read(_CHUNK.size))
@@ -160,12 +181,13 @@ def read_journal(file: FileIO, columns: Callable[[bytes], tuple[Widths, int]]) -
         chunks.append(_Chunk(begin, rows))
         last = b"".join(_pieces(file, begin + numbers - p * _NUMBER, p * _NUMBER))
         text = b"".join(_pieces(file, begin + numbers, text_length))
+        _fired(text, log)
         offset = end
     after = json.loads(text)
     if not isinstance(after, dict):
         raise RecordingError("not a recording in progress")
     weights: npt.NDArray[np.float64] = np.frombuffer(last, dtype="<f8").astype(np.float64)
-    return Journal(file, frame, every, first, widths, tuple(chunks), after, weights)
+    return Journal(file, frame, every, first, widths, tuple(chunks), after, weights, log.all)
 
 
 def _checksum(file: FileIO, begin: int, end: int) -> int:

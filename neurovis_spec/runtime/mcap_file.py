@@ -100,7 +100,7 @@ class _McapRows:
         ]
         about = {"network": frame.network, "hash": frame.hash, "dt": repr(frame.dt), "version": __version__}
         start = records.head("ros2", f"neurovis {__version__}") + records.metadata(_ABOUT, about)
-        start += records.attachment(FRAME, frame_bytes(frame))
+        start += records.attachment(FRAME, frame_bytes(replace(frame, spiking=None)))  # spikes are not in it
         start += records.schemas_and_channels([Schema(*ARRAY), Schema(*STRING)], channels)
         if frame.spec:
             start += records.chunk([Message(1, 0, 0, 0, text_message(frame.spec, "cdr"))])

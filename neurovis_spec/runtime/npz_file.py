@@ -24,7 +24,7 @@ from typing import IO, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import IntArray
+from neurovis_spec.arrays import IntArray, narrow
 from neurovis_spec.body import BodyError, Skeleton, skeleton_of, text_of
 from neurovis_spec.compiler.limits import DEEPEST
 from neurovis_spec.language.data.npy import LONGEST_HEADER, read_header
@@ -35,6 +35,7 @@ from neurovis_spec.runtime.files import Part, part_of, regular_size, replacing
 from neurovis_spec.runtime.journal import Journal, JournalWriter, is_begun, read_journal
 from neurovis_spec.runtime.recording import Recording, after_rows, ended
 from neurovis_spec.runtime.rows import KINDS, After, Rows, RowWriter, Steps, Widths
+from neurovis_spec.runtime.spikes import Fired
 
 Array: TypeAlias = npt.NDArray[np.generic]
 
@@ -65,6 +66,10 @@ OPTIONAL: Mapping[str, tuple[str, int]] = {
     "sensor_names": ("U", 1),
     "pose": ("fiu", 2),
     "skeleton": ("U", 0),
+    "spiking": ("iu", 1),
+    "spike_steps": ("iu", 1),
+    "spike_neurons": ("iu", 1),
+    "spike_range": ("iu", 1),
 }
 #: an archive may always grow to this many bytes, and beyond that to a hundred times its size
 ROOM = 256 * 2**20
@@ -77,7 +82,7 @@ _VIEWED: Mapping[str, str] = {"views": "neurons", "state_views": "states"}
 def write_npz(recording: Recording, path: Path) -> None:
     """Write a recording; what was there stays until all is written."""
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-        put_arrays(archive, {**_row_arrays(recording), **_fixed_arrays(recording)})
+        put_arrays(archive, {**_row_arrays(recording), **_fixed_arrays(recording), **_spike_arrays(recording)})
 
 
 def npz_size(frame: Recording, steps: Steps) -> int:
@@ -114,7 +119,7 @@ def _archive(file: FileIO, path: Path) -> None:
     journal, frame = _journal(file)
     rows, widths = journal.rows, journal.columns
     with replacing(path) as out, zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
-        put_arrays(archive, _fixed_arrays(frame))
+        put_arrays(archive, {**_fixed_arrays(frame), **_spike_arrays(frame)})
         recorded = _row_arrays(frame)
         for place, kind in enumerate(KINDS):
             if kind in recorded:
@@ -166,6 +171,8 @@ def _journal(file: FileIO) -> tuple[Journal, Recording]:
             arrays = {**journal_end, "weights_after": journal.weights}
             rows_end = after_rows(frame.step, frame.weights, len(frame.plastic))
             frame = ended(frame, _after(arrays, journal.after, rows_end, len(frame.neurons), len(frame.sources)))
+        if frame.spiking is not None:
+            frame = frame.with_fired(_checked(journal.fired, frame.spiking))
     except (OSError, RecordingError):
         raise
     except Exception as error:  # as in recording_errors
@@ -183,7 +190,7 @@ def frame_bytes(frame: Recording) -> bytes:
     """All but the rows, as an archive of its own."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-        put_arrays(archive, {**_row_arrays(frame.part(slice(0))), **_fixed_arrays(frame)})
+        put_arrays(archive, {**_row_arrays(frame.part(slice(0))), **_fixed_arrays(frame), **_spike_arrays(frame)})
     return file.getvalue()
 
 
@@ -214,6 +221,30 @@ def _row_arrays(recording: Recording) -> dict[str, Array]:
     if recording.pose is not None:
         arrays["pose"] = recording.pose
     return arrays
+
+
+def _spike_arrays(recording: Recording) -> dict[str, Array]:
+    """The spikes, each in as few bytes as hold it; they are no rows."""
+    if recording.spiking is None:
+        return {}
+    return {
+        "spiking": recording.spiking,
+        "spike_steps": narrow(recording.spike_steps),
+        "spike_neurons": narrow(recording.spike_neurons),
+        "spike_range": np.array(recording.spike_range, dtype=np.int64),
+    }
+
+
+def _checked(fired: Fired, spiking: IntArray) -> Fired:
+    """Spikes of neurons that may. Raises RecordingError for what are none."""
+    steps, neurons, first, stop = fired
+    if steps.shape != neurons.shape or not 0 <= first <= stop:
+        raise RecordingError("its spikes do not agree with each other")
+    if len(steps) and (int(steps.min()) < first or int(steps.max()) >= stop or (np.diff(steps) < 0).any()):
+        raise RecordingError("its spikes are not in the order of their steps")
+    if not np.isin(neurons, spiking).all():
+        raise RecordingError("'spike_neurons' holds a neuron that does not spike")
+    return fired
 
 
 def _fixed_arrays(recording: Recording) -> dict[str, Array]:
@@ -354,10 +385,11 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
     if not (math.isfinite(dt) and dt > 0):
         raise RecordingError(f"'dt' is {dt}")
     about = _about(arrays)
+    spiking = _integers(arrays, "spiking", 0, n, ascending=True) if "spiking" in arrays else None
     step = _integers(arrays, "step", 0, 2**62, ascending=True)
     weights = arrays["weights"].astype(np.float64)
     after = _after(arrays, about, after_rows(step, weights, p), n, m)
-    return Recording(
+    recording = Recording(
         activity=arrays["activity"].astype(np.float64),
         neurons=neurons,
         weights=weights,
@@ -388,6 +420,17 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         skeleton=skeleton,
         backend=str(about.get("backend", "")),
     )
+    return recording if spiking is None else recording.with_fired(_fired(arrays, spiking), spiking)
+
+
+def _fired(arrays: Mapping[str, Array], spiking: IntArray) -> Fired:
+    """The spikes of the neurons that do. Raises RecordingError."""
+    missing = [name for name in ("spike_steps", "spike_neurons", "spike_range") if name not in arrays]
+    if missing or len(arrays["spike_range"]) != 2:
+        raise RecordingError("it says who spikes, and not when")
+    steps, neurons = (arrays[name].astype(np.int64) for name in ("spike_steps", "spike_neurons"))
+    first, stop = arrays["spike_range"].astype(np.int64).tolist()
+    return _checked(Fired(steps, neurons, first, stop), spiking)
 
 
 def _checked_skeleton(arrays: Mapping[str, Array], rows: int) -> Skeleton | None:
@@ -420,13 +463,16 @@ def _after(arrays: Mapping[str, Array], about: Mapping[str, object], by_rows: Af
     if not 0 <= reached < 2**62:
         raise RecordingError(f"'reached' is {reached}")
     none = np.zeros(0, dtype=np.int64)
-    lesioned = {name: _integers(arrays, name, 0, high, ascending=True) if name in arrays else none
-                for name, high in (("lesioned_neurons", n), ("lesioned_connections", m))}  # fmt: skip
+    neurons, connections = (
+        _integers(arrays, name, 0, high, ascending=True) if name in arrays else none
+        for name, high in (("lesioned_neurons", n), ("lesioned_connections", m))
+    )
     return After(
         weights=arrays["weights_after"].astype(np.float64) if "weights_after" in arrays else by_rows.weights,
         reached=reached,
         set_parameters={str(name): float(value) for name, value in parameters.items()},
-        **lesioned,
+        lesioned_neurons=neurons,
+        lesioned_connections=connections,
     )
 
 

@@ -6,6 +6,7 @@ rows on to a RowSink while it runs.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -23,7 +24,7 @@ from neurovis_spec.interrupts import Asked, deferred
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Probing, Runner, Stepper, ready
 from neurovis_spec.runtime.checkpoint import load_state, save_state
-from neurovis_spec.runtime.columns import Columns, Numbers, Probe, columns_of, recording_of
+from neurovis_spec.runtime.columns import Columns, Numbers, Probe, Spiking, columns_of, recording_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied
@@ -34,6 +35,7 @@ from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import STRETCH, After, Rows, RowSink, Steps, Widths
+from neurovis_spec.runtime.spikes import SpikeLog
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.until import Watched
 from neurovis_spec.runtime.watch import Watch
@@ -61,7 +63,7 @@ def record(network: Network, course: Course = AS_IT_IS, progress: Progress | Non
     steps, widths = Steps(course.length(network), course.every, state.k), columns.widths(network)
     if not course.keep.last:
         check_room(steps.total, steps.every, sum(widths))
-    rows: InMemory | Last = Last(widths) if course.keep.last else InMemory(widths, len(steps))
+    rows: InMemory | Last = Last(widths, state.k) if course.keep.last else InMemory(widths, len(steps), state.k)
     if course.checkpoint is None:
         run_steps(network, state, course, rows, progress)
     else:
@@ -126,18 +128,19 @@ def end_values(network: Network, state: State) -> After:
 
 
 class InMemory:
-    """All rows in arrays of these widths."""
+    """All rows in arrays of these widths, and the spikes from step ``first`` on."""
 
-    def __init__(self, widths: Widths, rows: int) -> None:
+    def __init__(self, widths: Widths, rows: int, first: int = 0) -> None:
         self._rows = Rows.room(widths, rows)
         self._filled = 0
+        self.fired = SpikeLog(first)
         self.asked: Asked | None = None
 
     def numbers(self, steps: Steps) -> Numbers:
         """All that has come, for the first of these steps."""
         filled = slice(self._filled)
         numbers = np.concatenate([np.zeros(0, dtype=np.int64), *steps.parts()])
-        return Numbers(numbers[filled], self._rows.part(filled))
+        return Numbers(numbers[filled], self._rows.part(filled), self.fired.all)
 
     def begin(self, count: int) -> Rows:
         """The next rows of the arrays."""
@@ -157,17 +160,19 @@ class InMemory:
 
 
 class Last:
-    """The last row alone, of rows of these widths: memory does not grow with the steps."""
+    """The last row alone, of rows of these widths, and the spikes from step ``first`` on: memory grows with these
+    alone."""
 
-    def __init__(self, widths: Widths) -> None:
+    def __init__(self, widths: Widths, first: int = 0) -> None:
         self._widths, self._count = widths, 0
         self._rows = self._last = Rows.room(widths, 0)
+        self.fired = SpikeLog(first)
         self.asked: Asked | None = None
 
     def numbers(self, steps: Steps) -> Numbers:
         """The last that has come, for one of these steps."""
         number = [steps.at(self._count - 1)] if self._count else []
-        return Numbers(np.array(number, dtype=np.int64), self._last)
+        return Numbers(np.array(number, dtype=np.int64), self._last, self.fired.all)
 
     def begin(self, count: int) -> Rows:
         """Room for the next rows."""
@@ -209,7 +214,8 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     # a runner gives the activities of all neurons and all changing weights, states and signals of synapses only where
     # it is a probing one
     plain = columns.neurons is None and len(columns.weights) == len(network.changing)
-    if columns.probe.names:
+    spiking = columns.spiking if columns.spiking and rows.fired is not None else None
+    if columns.probe.names or (spiking is not None and len(spiking.by_state)):
         plain = plain and isinstance(stepper, Probing)
     if (
         isinstance(stepper, Runner)
@@ -218,7 +224,7 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
         and (course.until is None or course.until.measure.together)
     ):
         reader.leave(stepper)
-        make = _Together(hands, stepper, columns.probe, watched)
+        make = _Together(hands, stepper, columns.probe, spiking, watched)
         size = len(network.neurons) + len(network.connections) + 1
         pace = _Pace(max(1, min(_FIRST_STEPS, _FIRST_SIZE // size)), None if watched is None else STRETCH)
     controls, origin, last = Controls(network, backend.functions), state.k, state.k + steps
@@ -299,6 +305,7 @@ class _OneByOne:
         step, check, due, columns = self.stepper.step, watch.check, rows.due, self.columns
         changing, recorded = subscript(columns.weights), columns.neurons
         probe, forming = columns.probe if columns.probe.names else None, self.forming
+        fired = rows.fired if columns.spiking else None
         before = np.zeros(0)
         rows_left = _rows_between(first, stop, every)
         activity, weights, states, sensors, poses = rows.begin(rows_left)
@@ -316,6 +323,8 @@ class _OneByOne:
                     body.show(sensors[row], poses[row])
             step(state, vector)
             check(state)
+            if fired is not None and columns.spiking is not None:
+                fired.put(k, columns.spiking.now(state))
             if keep:
                 activity[row] = state.activity if recorded is None else state.activity[recorded]
                 if probe is not None:
@@ -347,6 +356,8 @@ class _Together:
     runner: Runner
     #: what is kept of states; nothing where the runner is not a probing one
     probe: Probe
+    #: whose spikes are noted, None where nobody spikes
+    spiking: Spiking | None = None
     watched: Watched | None = None
 
     def steps(self, state: State, first: int, stop: int) -> bool:
@@ -370,7 +381,7 @@ class _Together:
         for part in reader.parts(first, stop):
             begin = k
             while k < begin + len(part):
-                until = watch.next_stop(k, begin + len(part))
+                until = min(watch.next_stop(k, begin + len(part)), k + self._most(every))
                 vectors = part[k - begin : until - begin]
                 made = self._run(state, vectors, room.part(slice(row, None)), every, not watch.warned)
                 row += _rows_between(k, k + made, every)
@@ -384,26 +395,50 @@ class _Together:
 
     def _run(self, state: State, vectors: FloatArray, room: Rows, every: int, look: bool) -> int:
         """Steps, as the runner makes them, or fewer where the run is to end before."""
-        if self.watched is None:
+        if self.watched is None and self.spiking is None:
             return self._made(state, vectors, room, every, look)
-        before = state.copy()
-        # the measure sees every step, the recording one in ``every``
-        seen = room if every == 1 else Rows(*(np.empty((len(vectors), rows.shape[1])) for rows in room))
-        made = self._made(state, vectors, seen, 1, look)
-        count = self.watched.made(seen.activity[:made])
-        if every > 1:
-            kept = slice(-before.k % every, count, every)
-            wanted = _rows_between(before.k, before.k + count, every)
+        first, before = state.k, None if self.watched is None else state.copy()
+        # the measure and spikes are of every step, the recording of one in ``every``
+        seen = room if self._kept(every) else self._room_for(len(vectors), room)
+        made = count = self._made(state, vectors, seen, 1, look)
+        if self.watched is not None:
+            count = self.watched.made(seen.activity[:made])
+        if seen is not room:
+            kept = slice(-first % every, count, every)
+            wanted = _rows_between(first, first + count, every)
             for own, all_ in zip(room, seen, strict=True):
-                own[:wanted] = all_[kept]
-        if count < made:  # too far: back to before, and up to the step that ends the run
+                own[:wanted] = all_[kept, : own.shape[1]]
+        fired = self.hands.rows.fired
+        if self.spiking is not None and fired is not None:
+            activity = seen.activity[:count, self.spiking.by_activity]
+            beside, lesioned = seen.states[:count, room.states.shape[1] :], state.conditions.lesioned_neurons
+            fired.extend(self.spiking.of_rows(first, activity, beside, lesioned))
+        if before is not None and count < made:  # too far: back to before, and up to the step that ends the run
             state.become(before)
             self._made(state, vectors[:count], seen, 1, False)
         return count
 
+    def _kept(self, every: int) -> bool:
+        """Whether the rows that are kept are all that has to be seen."""
+        return every == 1 and (self.spiking is None or not len(self.spiking.by_state))
+
+    def _room_for(self, count: int, room: Rows) -> Rows:
+        """Rows for every step, with the states that tell of spikes behind those that are kept."""
+        more = 0 if self.spiking is None else len(self.spiking.by_state)
+        states = np.empty((count, room.states.shape[1] + more))
+        return Rows(*(np.empty((count, array.shape[1])) for array in room))._replace(states=states)
+
+    def _most(self, every: int) -> int:
+        """The most steps to be seen at once: where spikes are looked for in rows that are not kept, as many as there
+        is always room for."""
+        return sys.maxsize if self.spiking is None or self._kept(every) else STRETCH
+
     def _made(self, state: State, vectors: FloatArray, room: Rows, every: int, look: bool) -> int:
-        if self.probe.names and isinstance(self.runner, Probing):
-            self.runner.probe(self.probe, room.states)
+        probe = self.probe
+        if self.spiking is not None and room.states.shape[1] > len(probe.names):
+            probe = probe.beside(self.spiking.probe)
+        if probe.names and isinstance(self.runner, Probing):
+            self.runner.probe(probe, room.states)
         return self.runner.run(state, vectors, room.activity, room.weights, every, look)
 
 

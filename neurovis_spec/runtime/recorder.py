@@ -27,6 +27,7 @@ from neurovis_spec.runtime.formed import Forming
 from neurovis_spec.runtime.parts import files_beside
 from neurovis_spec.runtime.recording import Recording, for_path
 from neurovis_spec.runtime.rows import STRETCH, After, Rows, RowWriter, Steps
+from neurovis_spec.runtime.spikes import SpikeLog
 from neurovis_spec.runtime.state import State
 from neurovis_spec.runtime.stream import OFTEN, empty_recording
 
@@ -55,6 +56,7 @@ class Recorder:
         self._last, self._row, self._closed = state, -1, False
         self._widths = self._columns.widths(network)
         #: room for rows and how many of it are filled; full ones, where they stay in memory
+        self._spiking, self._fired = self._columns.spiking or None, SpikeLog(state.k)
         self._room, self._filled, self._before = Rows.room(self._widths, STRETCH), 0, list[Rows]()
         self._writer: RowWriter | None = None
         self._open, self._due = ExitStack(), monotonic() + OFTEN
@@ -96,6 +98,8 @@ class Recorder:
     def end(self, state: State) -> None:
         """After a step."""
         self._last = state
+        if self._spiking is not None:
+            self._fired.put(state.k - 1, self._spiking.now(state))
         if self._row >= 0:
             recorded = self._columns.neurons
             self._room.activity[self._row] = state.activity if recorded is None else state.activity[recorded]
@@ -110,7 +114,7 @@ class Recorder:
         """Give the rows to the file, or put them to those before."""
         rows = self._room.part(slice(self._filled))
         if self._writer is not None:
-            self._writer.write(rows, self._after(self._end_values()))
+            self._writer.write(rows, replace(self._after(self._end_values()), fired=self._fired.take()))
             self._due = monotonic() + OFTEN
         elif self._filled:
             self._before.append(rows)
@@ -137,7 +141,12 @@ class Recorder:
         step = np.array([self._steps.at(row) for row in range(count)], dtype=np.int64)
         end_values, backend = self._end_values(), self._last.backend
         return recording_of(
-            self._network, self._columns, Numbers(step, rows), end_values.weights, self._after(end_values), backend
+            self._network,
+            self._columns,
+            Numbers(step, rows, self._fired.all),
+            end_values.weights,
+            self._after(end_values),
+            backend,
         )
 
     def _after(self, end_values: After) -> After:

@@ -27,6 +27,7 @@ from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unkno
 from neurovis_spec.runtime.named_array import NamedArray
 from neurovis_spec.runtime.names import Found, Names
 from neurovis_spec.runtime.rows import After, Rows, Widths, no_indices
+from neurovis_spec.runtime.spikes import Fired, Spikes
 from neurovis_spec.runtime.traces import Traced, traces
 
 if TYPE_CHECKING:
@@ -82,6 +83,8 @@ class Recording:
     ``sensor_names`` names, and ``pose`` (rows, ``skeleton.size``) is the body at the beginning of each step. They are
     None where there was no body, or nothing to draw.
 
+    Where the network spikes, ``spikes("E")`` gives the spikes of a reference, also of steps that have no row.
+
     A partial recording holds the activities of some neurons alone, those that ``recorded`` lists (None: of all), so
     that ``activity`` has fewer columns, or no weights: then ``weights`` has no columns.
     """
@@ -123,6 +126,13 @@ class Recording:
     skeleton: Skeleton | None = None
     #: the name of the backend that made it, "" where that is not known
     backend: str = ""
+    #: the indices of the neurons whose spikes it holds, ascending; None where it holds none
+    spiking: IntArray | None = None
+    #: the spikes (spikes,), in the order of their steps, which need have no row: the steps, and the neurons
+    spike_steps: IntArray = field(default_factory=no_indices)
+    spike_neurons: IntArray = field(default_factory=no_indices)
+    #: the first of the steps whose spikes it holds, and the step behind the last
+    spike_range: tuple[int, int] = (0, 0)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensor_names", tuple(self.sensor_names))
@@ -132,6 +142,11 @@ class Recording:
         if self.recorded is not None:
             object.__setattr__(self, "recorded", np.asarray(self.recorded, dtype=np.int64))
             frozen(self.recorded)
+        if self.spiking is not None:
+            object.__setattr__(self, "spiking", frozen(np.asarray(self.spiking, dtype=np.int64)))
+        for name in ("spike_steps", "spike_neurons"):
+            object.__setattr__(self, name, frozen(np.asarray(getattr(self, name), dtype=np.int64)))
+        object.__setattr__(self, "spike_range", tuple(self.spike_range))
         for array in (self.activity, self.weights, self.weights_static, self.plastic, self.sources, self.targets,
                       self.delays, self.step, self.ranks, self.weights_after, self.lesioned_neurons,
                       self.lesioned_connections, self.states):  # fmt: skip
@@ -171,6 +186,45 @@ class Recording:
         if isinstance(found, str):
             raise UnknownNameError(found)
         return tuple(self.neurons[index] for index in found.neurons)
+
+    def spikes(self, reference: str) -> Spikes:
+        """When the neurons of a reference have fired: times in seconds, and which of them it was, as indices into
+        ``names_of(reference)``. Raises KeyError with the nearest names, or where they do not spike, RecordingError
+        where the recording holds no spikes."""
+        if self.spiking is None:
+            raise RecordingError(
+                "the recording holds no spikes: no model of the network spikes, or it was not read from a .npz"
+            )
+        found = self._names.find(arguments.text("reference", reference))
+        if isinstance(found, str):
+            raise UnknownNameError(found)
+        silent = sorted(set(found.neurons) - set(self.spiking.tolist()))
+        if silent:
+            names = listed([self.neurons[index] for index in silent])
+            was, does = ("was", "does") if len(silent) == 1 else ("were", "do")
+            if self.recorded is not None and not np.isin(silent, self.recorded).any():
+                raise UnknownNameError(f"{names} {was} not recorded")
+            raise UnknownNameError(f"{names} {does} not spike")
+        place = np.full(len(self.neurons), -1, dtype=np.int64)
+        place[list(found.neurons)] = np.arange(len(found.neurons))
+        places = place[self.spike_neurons]
+        own = places >= 0
+        return Spikes(np.asarray(self.spike_steps[own] * self.dt, np.float64), places[own])
+
+    @property
+    def fired(self) -> Fired:
+        """All spikes it holds."""
+        return Fired(self.spike_steps, self.spike_neurons, *self.spike_range)
+
+    def with_fired(self, fired: Fired, spiking: IntArray | None = None) -> Recording:
+        """A recording with these spikes in place of its own, of these neurons, where others ``spiking`` are given."""
+        return replace(
+            self,
+            spiking=self.spiking if spiking is None else spiking,
+            spike_steps=fired.steps,
+            spike_neurons=fired.neurons,
+            spike_range=(fired.first, fired.stop),
+        )
 
     def _found(self, name: str) -> tuple[FloatArray, Found]:
         """Where the numbers of a reference are: an array, and its columns."""
@@ -239,8 +293,19 @@ class Recording:
         )
 
     def part(self, rows: slice | npt.NDArray[np.bool_]) -> Recording:
-        """A recording of some of the rows."""
-        return self.having(self.step[rows], Rows(*(array[rows] for array in self.rows)))
+        """A recording of some of the rows, and of the spikes from the first to the last of them; behind the last one of
+        all up to the next, or to the end."""
+        some = self.having(self.step[rows], Rows(*(array[rows] for array in self.rows)))
+        if self.spiking is None:
+            return some
+        places = np.arange(len(self))[rows]
+        first, stop = self.spike_range
+        if not len(places):
+            stop = first
+        else:
+            first = first if places[0] == 0 else int(self.step[places[0]])
+            stop = stop if places[-1] == len(self) - 1 else int(self.step[places[-1] + 1])
+        return some.with_fired(self.fired.between(first, stop))
 
     @property
     def missing(self) -> str | None:

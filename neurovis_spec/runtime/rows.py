@@ -13,6 +13,7 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.runtime.spikes import NONE_FIRED, Fired, SpikeLog
 
 #: in the order of Widths and Rows; in messages the last part of the topics
 KINDS: Final = ("activity", "weights", "states", "sensors", "pose")
@@ -79,6 +80,8 @@ class After:
     set_parameters: Mapping[str, float] = field(default_factory=dict)
     lesioned_neurons: IntArray = field(default_factory=no_indices)
     lesioned_connections: IntArray = field(default_factory=no_indices)
+    #: with rows that are written: the spikes of the steps since those before
+    fired: Fired = field(default=NONE_FIRED, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +112,12 @@ class Steps:
 
 
 class RowSink(Protocol):
-    """Where rows go, a stretch of the run at a time."""
+    """Where rows go, a stretch of the run at a time, and the spikes of all steps."""
+
+    @property
+    def fired(self) -> SpikeLog | None:
+        """Where spikes go, before the rows that are handed on with them; None where nobody asks for them."""
+        ...
 
     def begin(self, count: int) -> Rows:
         """Arrays for the next ``count`` rows, or for the first of these; for a stretch of steps always for all."""

@@ -9,6 +9,7 @@ of the others the whole recording is saved. A stream begins with an *empty recor
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
@@ -22,6 +23,7 @@ from neurovis_spec.runtime.memory import check_disk
 from neurovis_spec.runtime.record import InMemory, begin_run, end_values, keep_state, record, run_steps
 from neurovis_spec.runtime.recording import Recording, for_path
 from neurovis_spec.runtime.rows import After, Rows, RowWriter, Steps, Widths
+from neurovis_spec.runtime.spikes import SpikeLog
 from neurovis_spec.runtime.state import State
 
 #: seconds after which rows are handed on: at most this much of a run, and one step, is lost
@@ -42,7 +44,7 @@ class StoppedError(Ended):
 
 def empty_recording(network: Network, columns: Columns, state: State) -> Recording:
     """A recording of a network without a step, which begins in this state."""
-    no_rows = InMemory(columns.widths(network), 0).numbers(Steps(0))
+    no_rows = InMemory(columns.widths(network), 0, state.k).numbers(Steps(0))
     return recording_of(network, columns, no_rows, state.weights, end_values(network, state), state.backend)
 
 
@@ -65,7 +67,8 @@ def record_to(network: Network, path: Path, course: Course, progress: Progress |
     try:
         with deferred() as signal_asked:  # its end raises KeyboardInterrupt after a signal
             with format_.stream(path, empty, steps) as writer:
-                rows = _BufferedRows(columns.widths(network), writer, lambda: end_values(network, state), signal_asked)
+                widths, first = columns.widths(network), state.k
+                rows = _BufferedRows(widths, writer, lambda: end_values(network, state), signal_asked, first)
                 run_steps(network, state, course, rows, progress)
                 if signal_asked and not rows.handed:
                     keep_state(state, course)
@@ -84,10 +87,13 @@ def record_to(network: Network, path: Path, course: Course, progress: Progress |
 class _BufferedRows:
     """A RowSink: rows go on to a writer when their arrays, which are used again, are full or some time has passed."""
 
-    def __init__(self, widths: Widths, writer: RowWriter, after: Callable[[], After], signal_asked: Asked) -> None:
+    def __init__(
+        self, widths: Widths, writer: RowWriter, after: Callable[[], After], signal_asked: Asked, first: int
+    ) -> None:
         self._rows = Rows.lent(widths)
         self._writer, self._after, self._signal_asked = writer, after, signal_asked
         self._due = monotonic() + OFTEN
+        self.fired = SpikeLog(first)
         #: how many rows the writer has
         self.handed = 0
 
@@ -98,7 +104,7 @@ class _BufferedRows:
     def end(self, count: int) -> None:
         """Hand so many rows on, with what is true after the last step made."""
         if count:
-            self._writer.write(self.begin(count), self._after())
+            self._write(count)
             self.handed += count
         self._due = monotonic() + OFTEN
 
@@ -111,5 +117,8 @@ class _BufferedRows:
         return bool(self._signal_asked)
 
     def close(self) -> None:
-        """Hand on what is true after the last step, which may lie behind the last row."""
-        self._writer.write(self.begin(0), self._after())
+        """Hand on what is true after the last step, which may lie behind the last row, and what has fired since."""
+        self._write(0)
+
+    def _write(self, count: int) -> None:
+        self._writer.write(self.begin(count), replace(self._after(), fired=self.fired.take()))

@@ -15,6 +15,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.runtime.measures import Measure, Meter, findings_of, measure_of
 from neurovis_spec.runtime.rows import Rows, RowSink
+from neurovis_spec.runtime.spikes import SpikeLog
 from neurovis_spec.runtime.state import State
 
 LABEL = "<until>"
@@ -63,6 +64,11 @@ class Watched:
         self._until, self._rows, self._state = until, rows, state
         self._meter = Meter(until.measure, state.k)
         self._met = False
+
+    @property
+    def fired(self) -> SpikeLog | None:
+        """Where spikes go."""
+        return self._rows.fired
 
     def begin(self, count: int) -> Rows:
         """Arrays for the next rows."""

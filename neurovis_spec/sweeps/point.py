@@ -125,6 +125,8 @@ def _measured(job: Job, network: Network) -> tuple[float, ...]:
 class _Metered:
     """Rows that are measured and forgotten."""
 
+    fired = None
+
     def __init__(self, network: Network, state: State, meters: Sequence[Meter], columns: Columns) -> None:
         self._rows = Rows.lent(columns.widths(network))
         self._state, self._meters = state, meters
