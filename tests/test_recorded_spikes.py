@@ -76,7 +76,7 @@ def test_what_has_no_spikes_says_so() -> None:
     part = NETWORK.run(20, backend="reference", neurons="K")
     with pytest.raises(KeyError, match="H1, H2 were not recorded"):
         part.spikes("H")
-    quiet = nv.compile_text("neurovis: 1\nneurons: {O: {count: 2}}\n").run(3, backend="reference")
+    quiet = nv.compile_text("neurovis: 1\nname: quiet\nneurons: {O: {count: 2}}\n").run(3, backend="reference")
     with pytest.raises(RecordingError, match="holds no spikes"):
         quiet.spikes("O")
 

@@ -1,8 +1,8 @@
 """Raster: neurons × time as coloured cells, in the colours that they have in the picture of the network (Eq. 2).
 
 In: activities, colour values, a Span. Out: a Part. Where there are more steps or neurons than cells can be seen, a cell
-has the strongest colour of those it stands for, so that nothing is lost. A group whose model has states and whose
-activities are 0 but for single steps of 1 spikes: its spikes are marks.
+has the strongest colour of those it stands for, so that nothing is lost. Of neurons that spike the spikes are marks,
+all of them, also those of steps that are not among the rows.
 """
 
 from __future__ import annotations
@@ -57,13 +57,13 @@ def bands_of(names: Sequence[str]) -> tuple[Band, ...]:
 
 @dataclass(frozen=True)
 class Heat:
-    """``count`` rows: their activities, and their colour values in −1…1, for any of them by number (steps, rows); which
-    ``may_spike``; their names, with subscripts, and their groups."""
+    """``count`` rows: their colour values in −1…1, for any of them by number (steps, rows); which are ``spiking``, and
+    the spikes of these, steps and numbers of rows; their names, with subscripts, and their groups."""
 
     title: str
-    activity: Callable[[IntArray], FloatArray]
     colour: Callable[[IntArray], FloatArray]
-    may_spike: npt.NDArray[np.bool_]
+    spiking: npt.NDArray[np.bool_]
+    spikes: tuple[IntArray, IntArray]
     names: tuple[tuple[str, str], ...]
     #: the groups, and what they are in: the instance, if they are in one
     groups: tuple[Band, ...]
@@ -107,6 +107,9 @@ class Heat:
             shapes += strips.time_axis(span, bottom, theme)
         line, moved = strips.cursor(span, top, bottom, theme, f"{prefix}cursor")
         said = f"{len(self.names)} neurons, steps {span.steps[0]} … {span.steps[-1]}"
+        if self.spiking.any():
+            seen = np.count_nonzero((self.spikes[0] >= span.steps[0]) & (self.spikes[0] < span.ends[1]))
+            said += f", {seen:,} spikes"
         ground = Group(tuple(shapes), f"{prefix}ground", {"view": "raster"}, said)
         height = bottom + (strips.AXIS if axis else 0.0)
         return Part((ground, line), height, Changes(shifts=(line.id,), shift_values=moved))
@@ -116,23 +119,39 @@ class Heat:
         steps = strips.columns(span, int(span.right - span.left))
         count = len(self.names)
         rows = np.unique(np.linspace(0, count, min(count, max(1, int(2 * plot))) + 1).astype(np.int64))
-        shown, marked = (np.empty((len(steps) - 1, count)) for _ in range(2))
-        kinds, spike = np.empty(count, np.int64), np.zeros(count)
+        shown = np.zeros((len(steps) - 1, count))
         for first in range(0, count, _TOGETHER):
             some = np.arange(first, min(first + _TOGETHER, count))
-            activity = self.activity(some)
-            shown[:, some] = strongest(self.colour(some), steps, 0)
-            marked[:, some] = strongest(activity, steps, 0)
-            kinds[some] = np.where(self.may_spike[some], spiking(activity), -1)
-        for group in self.groups:  # also those of its neurons that are silent
-            own_kinds = kinds[group.start : group.start + group.count]
-            spike[group.start : group.start + group.count] = own_kinds.min() >= 0 and own_kinds.max() > 0
+            some = some[~self.spiking[some]]
+            if len(some):
+                shown[:, some] = strongest(self.colour(some), steps, 0)
+        edges = self._edges(span, steps)
+        if len(edges) != len(steps):
+            row_edges = span.steps[steps[:-1]] - span.stride / 2
+            shown = shown[np.searchsorted(row_edges, (edges[1:] + edges[:-1]) / 2, "right") - 1]
         colours = blend(theme, strongest(shown, rows, 1))
-        own = strongest(spike[None], rows, 1)[0] > 0
+        own = strongest(self.spiking[None].astype(np.float64), rows, 1)[0] > 0
         colours[:, own] = np.array(channels(theme.box_fill), np.uint8)
-        colours[(strongest(marked * spike, rows, 1) > 0) & own[None]] = np.array(channels(theme.ink), np.uint8)
+        colours[self._marks(edges, rows)] = np.array(channels(theme.ink), np.uint8)
         cells = colours.transpose(1, 0, 2)
         return cells.shape[1], cells.shape[0], np.ascontiguousarray(cells).tobytes()
+
+    def _edges(self, span: Span, columns: IntArray) -> FloatArray:
+        """The steps between columns of cells, from the first edge to the last. Where rows are apart there are columns
+        between them for spikes."""
+        first, last = span.ends
+        if span.stride > 1 and self.spiking.any():
+            return np.linspace(first, last, max(1, min(int(span.right - span.left), int(last - first))) + 1)
+        return np.append(span.steps[columns[:-1]] - span.stride / 2, last)
+
+    def _marks(self, edges: FloatArray, rows: IntArray) -> npt.NDArray[np.bool_]:
+        """In which cells there is a spike."""
+        marked = np.zeros((len(edges) - 1, len(rows) - 1), np.bool_)
+        steps, neurons = self.spikes
+        inside = (steps >= edges[0]) & (steps < edges[-1])
+        across = np.searchsorted(edges, steps[inside], "right") - 1
+        marked[across, np.searchsorted(rows, neurons[inside], "right") - 1] = True
+        return marked
 
     def _sides(self, span: Span, top: float, plot: float, theme: Theme) -> list[Shape]:
         """Names beside the rows, or of the groups; lines between groups."""
@@ -176,16 +195,3 @@ def strongest(values: FloatArray, cuts: IntArray, axis: int) -> FloatArray:
 
 def _beside(base: str, subscript: str, right: float, middle: float, size: float, theme: Theme) -> Text:
     return Text((right, middle + 0.36 * size), base, size, theme.ink, "end", subscript=subscript)
-
-
-def spiking(activity: FloatArray) -> IntArray:
-    """Whose activities (steps, rows) are spikes: 1 where they are 1 at times and else 0, never twice in a row; 0 where
-    they are always 0; −1 for others.
-
-    >>> spiking(np.array([[0, 1, 0.0], [1, 1, 0], [0, 0, 0]]))
-    array([ 1, -1,  0])
-    """
-    on = activity == 1
-    only = (on | (activity == 0)).all(axis=0) & ~(on[1:] & on[:-1]).any(axis=0)
-    result: IntArray = np.where(only, on.any(axis=0), -1).astype(np.int64)
-    return result

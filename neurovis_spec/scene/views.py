@@ -11,11 +11,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.network import Network, StepLength
 from neurovis_spec.layout.model import Layout
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene import body, encoding, strips
 from neurovis_spec.scene.encode import tooltips
 from neurovis_spec.scene.ends import effects_of, ends_of, signed
@@ -268,31 +270,26 @@ class Maker:
         if not len(neurons):
             return Note("there is no neuron to show")
         recording.check_whole("a raster cannot be drawn from")
-        stateful = np.zeros(len(network.neurons), np.bool_)
-        for population in network.populations:
-            stateful[population.members] = bool(population.model.definition.state)
         group_of = {index: group.name for group in network.neurons.groups for index in group.indices}
         groups = [group_of[index] for index in neurons.tolist()]
         bands = bands_of(groups), bands_of([group.partition(".")[0] for group in groups])
         rows, gains, states = self.shots.rows, self.gains, ShownStates(network)
         assert gains is not None
         values = states.recorded(recording)
-        stateful[states.neurons] = False  # what is shown of these is no spike
-
-        def activity(some: IntArray) -> FloatArray:
-            result: FloatArray = values[rows][:, neurons[some]]
-            return result
 
         def colour(some: IntArray) -> FloatArray:
             own = neurons[some]
-            return encoding.neuron_colour(activity(some), gains.activity[own], gains.centre[own])
+            return encoding.neuron_colour(values[rows][:, own], gains.activity[own], gains.centre[own])
 
-        own = set(np.unique(gains.activity[neurons]).tolist())
+        spiking, spikes = _spikes(recording, neurons)
+        own = set(np.unique(gains.activity[neurons[~spiking]]).tolist())
         used = [(one, 1 / abs(one.gain or 1e-9)) for one in gains.activity_scales if one.gain in own]
         scale = ScaleLabel("") if self.explained else scale_of("", used)
         names = short_names([curve for curve in curves if curve.of == "neuron"], network)
-        what = ", ".join(dict.fromkeys(states.called[index] or "activity" for index in neurons.tolist()))
-        return Raster(Heat(what, activity, colour, stateful[neurons], tuple(names), *bands, scale))
+        whose = zip(neurons.tolist(), spiking.tolist(), strict=True)
+        told = ["spikes" if fires else states.called[index] or "activity" for index, fires in whose]
+        what = ", ".join(dict.fromkeys(told))
+        return Raster(Heat(what, colour, spiking, spikes, tuple(names), *bands, scale))
 
     def _matrix(self, shown: tuple[Curve, ...] | None) -> Block:
         network = self.network
@@ -333,6 +330,17 @@ class Maker:
         scale = scale_of("weight (− inhibits)" if said else "weight", used)
         rows, columns = (order_of(network, self.layout, some) for some in (sources, targets))
         return Grid(MatrixCells(network, rows, columns, connections, np.nan_to_num(values), scale, titles, title))
+
+
+def _spikes(recording: Recording, neurons: IntArray) -> tuple[npt.NDArray[np.bool_], tuple[IntArray, IntArray]]:
+    """Which of some neurons spike, and their spikes: steps, and places among these neurons."""
+    if recording.spiking is None:
+        return np.zeros(len(neurons), np.bool_), (neurons[:0], neurons[:0])
+    place = np.full(len(recording.neurons), -1, np.int64)
+    place[neurons] = np.arange(len(neurons))
+    places = place[recording.spike_neurons]
+    own = places >= 0
+    return np.isin(neurons, recording.spiking), (recording.spike_steps[own], places[own])
 
 
 def _full_at(
