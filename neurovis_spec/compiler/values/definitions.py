@@ -218,8 +218,11 @@ class _Checker:
         self.arriving = reading.kind == SYNAPSE or not acts.isdisjoint(("on_pre", "on_post"))
         if self.arriving:
             self.known.declared[SPIKE] = None
-        for key in (entry.key for entry in model.source.entries if entry.name == SPIKE and reading.kind == MODEL):
-            self.known.declared[SPIKE] = key.span
+        #: where the spike block of a model stands
+        keys = (entry.key.span for entry in model.source.entries if entry.name == SPIKE and reading.kind == MODEL)
+        self.firing = next(keys, None)
+        if self.firing is not None:
+            self.known.declared[SPIKE] = self.firing
         #: whether x^3 and x^4 are products
         self.products = (
             reading.products
@@ -390,10 +393,11 @@ class _Checker:
         if send is None or send.value == MODEL.gives:
             return ""
         kept = {"state": self.parts.state or {}, "outputs": self.parts.outputs or {}}
-        known = [names_of(self.model, section, made) for section, made in kept.items()]
-        if not any(send.value in names for names in known):
+        known = [name for section, made in kept.items() for name in names_of(self.model, section, made)]
+        known += [] if self.firing is None else [SPIKE]
+        if send.value not in known:
             message = f"'{shorten(send.value)}' is neither a state nor an output of this model"
-            hint = suggest(send.value, [*(name for names in known for name in names), MODEL.gives], "what can be sent")
+            hint = suggest(send.value, [*known, MODEL.gives], "what can be sent")
             self.findings.error("unknown-state", send.span, message, hint)
         return send.value
 
