@@ -133,7 +133,18 @@ RULES: dict[str, dict[str, Plain]] = {
     "slow": {"signals": ["by"], "weight": {"each_step": "weight - 0.02*weight*by"}},
     "told": {"signals": ["by"], "state": {"told": {"on_pre": "0.5*told + by"}}, "weight": {"on_post": "weight + 0.1*told"}},
 }  # fmt: skip
-DELAYS: list[Plain] = [None, None, 1, 1, 2, 7, "2.4 ms", {"seconds": "0.0012 + 0.001*i"}, "uniform(1, 4)", "1 + (i + 2*j) % 3"]
+DELAYS: list[Plain] = [
+    None,
+    None,
+    1,
+    1,
+    2,
+    7,
+    "2.4 ms",
+    {"seconds": "0.0012 + 0.001*i"},
+    "uniform(1, 4)",
+    "1 + (i + 2*j) % 3",
+]
 _STATES = {"lif": "v", "wave": "x", "map": "u", "decay": "g", "hop": "p", "leaky_integrator": "v"}
 
 
@@ -158,7 +169,7 @@ def made_spec(chooser: random.Random, groups: int, most: int = 3) -> Spec:
                 body = _connection(chooser, kinds[source], kinds[target], used, i < j, [*sizes.items()])
                 if sizes[source] > 1 or sizes[target] > 1:
                     drawn = ["all_to_all", {"random": {"probability": 0.7}}]
-                    body["pattern"] = chooser.choice(drawn if sizes[source]*sizes[target] > 5 else drawn[:1])
+                    body["pattern"] = chooser.choice(drawn if sizes[source] * sizes[target] > 5 else drawn[:1])
                 connections[f"{source} -> {target}"] = body
     return {
         "neurovis": 1,
@@ -251,7 +262,11 @@ def _rule(
 ) -> Plain:
     called = _named(used.rules, _filled(chooser, RULES[name], source, target))
     if "signals" not in RULES[name]:
-        return {called: {"up": "w/10"}} if "up" in str(RULES[name].get("parameters")) and chooser.random() < 0.5 else called
+        return (
+            {called: {"up": "w/10"}}
+            if "up" in str(RULES[name].get("parameters")) and chooser.random() < 0.5
+            else called
+        )
     single = [group for group, size in sizes if size == 1]
     return {called: {"by": chooser.choice([*single, "pulse"])}}
 

@@ -16,7 +16,7 @@ and where K's signals are shared, ``weights[0]*signals[0]`` and ``signals[0] = a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, singledispatch
@@ -311,8 +311,7 @@ class StepCode:
             states = {one.name: stored[one.name] for one in part.state}
             seen = {**code.parameters(model, place), **self.sight.clock(part), **ports}
             functions, kept = self.activation(population, place), partial(self.unless_held, model, place)
-            staying = states if part is not parts[-1] else None
-            new, given = self.change(part, seen, states, functions, kept, self.form.first, staying)
+            new, given = self.change(part, seen, states, functions, kept, self.form.first)
             self.store([(stored[name], value) for name, value in new.items()])
             return given
 
@@ -515,7 +514,8 @@ class StepCode:
         """What of the model of a population is carried out at its update, one behind the other; the last gives the
         activity and the outputs."""
         made = self.network.populations[number].model.definition
-        ahead = (replace(made.during([phase]), gives=()) for phase in self.phases[number])
+        # nothing of these is carried out at the first step, as of what fires
+        ahead = (replace(made.during([phase]), gives=(), fires=True) for phase in self.phases[number])
         return *ahead, made.at_update
 
     def _read_in(self, made: Definition) -> frozenset[str]:
@@ -587,7 +587,7 @@ class StepCode:
         changed: dict[str, Value] = {}
         *ahead, last = self.definitions(number)
         for part in ahead:
-            new, _ = self.change(part, seen, states, functions, kept, self.form.first, states)
+            new, _ = self.change(part, seen, states, functions, kept, self.form.first)
             states |= new
             changed |= new
         new, given = self.change(last, seen, states, functions, kept, self.form.first)
@@ -639,11 +639,10 @@ class StepCode:
         functions: Mapping[str, Made] = _NONE,
         bounded: Callable[[str, Value], Value] = lambda name, value: value,
         begins: bool = False,
-        staying: Collection[str] | None = None,
     ) -> tuple[dict[str, Value], dict[str, Value]]:
         """What becomes of all that lasts of a definition, which is ``stored`` there, from old values at once, and once
         more at an episode's end, ``bounded``; and what does not last, made from the new states. Nothing is stored
-        yet. With ``begins`` there is a first step, at which what stays as it is (``staying``) does."""
+        yet. With ``begins`` there is a first step, at which what stays as it is does."""
         code = self.code
         steps = made.steps
         ends = {one.name: one.each_episode for one in made.lasting}
@@ -653,7 +652,7 @@ class StepCode:
         new = self.values(steps, known, "n", functions)
         new = {name: bounded(name, value) for name, value in new.items()}
         for name in new if begins else ():
-            if name in (made.staying if staying is None else staying):
+            if name in made.staying:
                 new[name] = code.let("n", f"first ? {code.text(stored[name])} : {code.text(new[name])}")
         given = self.values(fleeting, known | new, "y", functions)
         if self.network.episode is None or not any(tree is not None for tree in ends.values()):
