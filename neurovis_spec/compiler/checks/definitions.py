@@ -17,7 +17,7 @@ import numpy as np
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.flows import jacobian, slope_by, with_slope
-from neurovis_spec.compiler.names.references import key_of, key_span
+from neurovis_spec.compiler.names.references import Section, key_of, key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.neurons.populate import Census
