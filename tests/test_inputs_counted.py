@@ -30,6 +30,7 @@ models:
     ports: [excitatory]
     state: {v: {derivative: (10*excitatory - v + drive)/tau}}
     activity: v
+  jumps: {ports: [excitatory], state: {v: {derivative: -v/0.02, jump: excitatory}}, activity: v}
 inputs:
   listed: {spikes: {times: [[0, 0.01, 0.09, 0.09], [w/10]]}}
   rain: {size: 4, poisson: rate*(1 + 0.5*sin(50*t))*(i + 1)/n}
@@ -38,6 +39,7 @@ inputs:
 neurons:
   B: {count: 2, input: listed}
   C: {count: 4, model: leak, input: {excitatory: rain}}
+  J: {count: 4, model: jumps, input: {excitatory: rain}}
   D: {count: 6, model: leak, input: six, noise: poisson(2)}
   F: {count: 6, input: six}
   G: {count: 2, input: same}
