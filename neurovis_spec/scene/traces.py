@@ -2,7 +2,8 @@
 
 In: curves and their values, a Span. Out: a Part. More curves than there are colours that can be told apart stand in
 several strips with the same scale. Long runs are drawn by the lowest and the highest value of each column of the
-picture, so that nothing of them is lost; a gap is where there is no number.
+picture, so that nothing of them is lost; a gap is where there is no number. Above the curves of neurons that spike are
+marks where they do.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.scene import strips, texts
 from neurovis_spec.scene.model import Disc, Group, Point, Polyline, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
@@ -30,19 +32,22 @@ _LABEL, _OFF = 120.0, 14.0
 _APART, _LINE = 19.0, 13.0
 _WIDTH = 1.6
 _MOST_TICKS = 7
+#: How high a row of marks for spikes is, with what stands off it, and the share of a plot that all take at most.
+_MARK, _MARKED = 6.0, 0.35
 _BOLD = 600
 
 
 @dataclass(frozen=True)
 class Trace:
-    """A curve: its name and a subscript, its values (rows,) and (frames,), and what a pointer shows."""
+    """A curve: its name and a subscript, its values (rows,) and (frames,), and what a pointer shows; the steps
+    (spikes,) at which its neuron fires, None where that is not marked."""
 
     name: str
     subscript: str
     values: FloatArray
     moments: FloatArray
     full: str
-    state: str = ""
+    spikes: IntArray | None = None
 
 
 @dataclass(frozen=True)
@@ -109,7 +114,8 @@ class Traces:
         for number, members in enumerate(self.strips):
             name = f"{prefix}s{number}:"
             last = axis and number == len(self.strips) - 1
-            frame = _Frame(span, top + TITLE, top + TITLE + plot, *self.range)
+            marks = sum(trace.spikes is not None for trace in members)
+            frame = _Frame(span, top + TITLE, top + TITLE + plot, *self.range, min(marks * _MARK, _MARKED * plot))
             data = {"view": self.view} if number == 0 else {}
             groups.append(Group(tuple(self._ground(frame, number, last, theme)), f"{name}ground", data))
             groups += _curves(frame, members, self._cut, theme, name)
@@ -145,13 +151,14 @@ _HUGE = 1.7e308
 
 @dataclass(frozen=True)
 class _Frame:
-    """A plot: its top and bottom, and the values there."""
+    """A plot: its top and bottom, and the values there, below the room for marks at its top."""
 
     span: Span
     top: float
     bottom: float
     low: float
     high: float
+    marked: float = 0.0
 
     def y(self, values: FloatArray) -> FloatArray:
         """How far down values lie; of huge ones no difference overflows."""
@@ -159,13 +166,13 @@ class _Frame:
         low, high = math.ldexp(self.low, -exponent), math.ldexp(self.high, -exponent)
         with np.errstate(invalid="ignore", over="ignore", under="ignore"):
             share = (np.ldexp(values, -exponent) - low) / (high - low)
-            result: FloatArray = self.bottom - share * (self.bottom - self.top)
+            result: FloatArray = self.bottom - share * (self.bottom - self.top - self.marked)
         return result
 
 
 def _curves(frame: _Frame, members: Sequence[Trace], cut: Cut, theme: Theme, name: str) -> list[Group]:
     places = _ends(frame, members)
-    groups = []
+    groups, row, rows = list[Group](), 0, sum(trace.spikes is not None for trace in members)
     for number, (trace, colour) in enumerate(zip(members, distinct(theme), strict=False)):
         shapes: list[Shape] = [Polyline(points, colour, _WIDTH) for points in _lines(frame, trace.values)]
         if places is not None:
@@ -179,8 +186,22 @@ def _curves(frame: _Frame, members: Sequence[Trace], cut: Cut, theme: Theme, nam
         range_ = (
             f"{texts.number(float(finite.min()), 4)} … {texts.number(float(finite.max()), 4)}" if len(finite) else "—"
         )
-        groups.append(Group(tuple(shapes), f"{name}t{number}", {"trace": trace.full}, f"{trace.full}\n{range_}"))
+        said = f"{trace.full}\n{range_}"
+        if trace.spikes is not None:
+            first, last = frame.span.ends
+            shown = trace.spikes[(trace.spikes >= first) & (trace.spikes < last)]
+            shapes += _marks(frame, shown, row, rows, colour)
+            said, row = f"{said}\n{plural(len(shown), 'spike')}", row + 1
+        groups.append(Group(tuple(shapes), f"{name}t{number}", {"trace": trace.full}, said))
     return groups
+
+
+def _marks(frame: _Frame, spikes: IntArray, row: int, rows: int, colour: str) -> list[Shape]:
+    """A mark for each spike, in one of some rows above the curves; those that cannot be told apart are one."""
+    height = frame.marked / rows
+    top = frame.top + (row + 0.25) * height
+    xs = np.unique(np.round(2 * frame.span.at(spikes)) / 2).tolist()
+    return [Polyline(((x, top), (x, top + 0.75 * height)), colour, 1.4) for x in xs]
 
 
 def _words(trace: Trace, cut: Cut) -> tuple[str, str]:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.network import Network, StepLength
+from neurovis_spec.compiler.program import SPIKE
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene import body, encoding, strips
@@ -242,10 +243,26 @@ class Maker:
             words += f" · {most} of {len(curves):,}{how}"
         rows, frames = self.shots.rows, self.shots.frames
         traces = []
-        for curve, name in zip(shown, short_names(shown, self.network), strict=True):
+        names = zip(shown, short_names(shown, self.network), self._fired_beside(shown), strict=True)
+        for curve, name, spikes in names:
             values = values_of(curve, self.network, self.shots.recording)
-            traces.append(Trace(*name, values[rows], values[frames], full_name(curve, self.network)))
+            traces.append(Trace(*name, values[rows], values[frames], full_name(curve, self.network), spikes))
         return Curves(Traces(panel.view, words, tuple(traces)))
+
+    def _fired_beside(self, curves: Sequence[Curve]) -> list[IntArray | None]:
+        """Of each curve the steps at which its neuron fires, once for each neuron, and where that is not what the curve
+        itself shows; else None."""
+        recording, found, marked = self.shots.recording, list[IntArray | None](), set[int]()
+        spiking = set() if recording.spiking is None else set(recording.spiking.tolist())
+        shown = {index for group in self.network.neurons.groups if group.spikes for index in group.indices}
+        for curve in curves:
+            itself = curve.state == SPIKE or (not curve.state and curve.index in shown)
+            spikes = None
+            if curve.of == "neuron" and curve.index in spiking - marked and not itself:
+                spikes = recording.spike_steps[recording.spike_neurons == curve.index]
+                marked.add(curve.index)
+            found.append(spikes)
+        return found
 
     def _changing_most(self, curves: Sequence[Curve], most: int) -> tuple[Curve, ...]:
         """Of weights those that change most in what is shown, in the order given."""
