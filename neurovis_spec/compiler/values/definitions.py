@@ -393,11 +393,11 @@ class _Checker:
         if send is None or send.value == MODEL.gives:
             return ""
         kept = {"state": self.parts.state or {}, "outputs": self.parts.outputs or {}}
-        known = [name for section, made in kept.items() for name in names_of(self.model, section, made)]
-        known += [] if self.firing is None else [SPIKE]
-        if send.value not in known:
+        known: list[Collection[str]] = [names_of(self.model, section, made) for section, made in kept.items()]
+        known.append(() if self.firing is None else (SPIKE,))
+        if not any(send.value in names for names in known):
             message = f"'{shorten(send.value)}' is neither a state nor an output of this model"
-            hint = suggest(send.value, [*known, MODEL.gives], "what can be sent")
+            hint = suggest(send.value, [*(name for names in known for name in names), MODEL.gives], "what can be sent")
             self.findings.error("unknown-state", send.span, message, hint)
         return send.value
 
