@@ -322,8 +322,10 @@ class SimulatedSource:
         activity, shown = run.activity, self._shown.of_run(run)
         self.quantities = run.looked(self._every)
         self.history.note(step, activity if shown is None else shown, weights, self.quantities)
-        seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
-        sent = self._signals.of_run(run)
+        sent, seen = self._signals.of_run(run), None
+        if self._fading:
+            seen = self._fading.follow(np.array([step]), activity[None], None if sent is None else sent[None])
+            sent = self._fading.sent if self._fading.sends else sent
         snapshot = Snapshot(step, activity, weights, previous, seen, pose, run.sensed, shown, sent, ends)
         return Seen(snapshot, *lesioned, held, run.probed(self._probe))
 

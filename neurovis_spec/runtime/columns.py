@@ -1,4 +1,5 @@
-"""Columns: what of each step is kept: activities, changing weights, states of models and rules; and who spikes.
+"""Columns: what of each step is kept, which are activities, changing weights and states of models and rules, and
+whose spikes are.
 
 In: a Network, and what is wanted of it (Keep). Out: Columns: the indices to take, and a Probe that reads states; a
 Recording of the rows that were kept.

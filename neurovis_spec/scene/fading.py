@@ -33,7 +33,7 @@ def seconds_of(network: Network) -> FloatArray:
 
     Without a word of the spec those that spike have one.
     """
-    usual = network.dt * max(_STEPS, _SECONDS * frames_a_second(network))
+    usual = _usual(network)
     result = np.zeros(len(network.neurons))
     for group in network.neurons.groups:
         if group.spikes:
@@ -43,11 +43,28 @@ def seconds_of(network: Network) -> FloatArray:
     return result
 
 
+def sent_seconds_of(network: Network) -> FloatArray:
+    """The same of what connections take beside activities, and of what their synapses form (``Signals``), (k,): of
+    spikes, and of what is made of one."""
+    signals = Signals(network)
+    return np.where(signals.spikes, _usual(network), 0.0) if signals else np.zeros(0)
+
+
+def _usual(network: Network) -> float:
+    """The time where the spec does not say it."""
+    return network.dt * max(_STEPS, _SECONDS * frames_a_second(network))
+
+
 class Fading:
-    """Follows the activities of a run, forward, and knows what a picture shows of them."""
+    """Follows the activities of a run, and what else its connections send, forward, and knows what a picture shows of
+    them: ``sent`` is that of what is sent, None where nothing of it fades."""
 
     def __init__(self, network: Network) -> None:
-        seconds = seconds_of(network)
+        seconds, sent = seconds_of(network), sent_seconds_of(network)
+        self._count, self.sends = len(seconds), bool(sent.any())
+        self.sent: FloatArray | None = None
+        if self.sends:
+            seconds = np.concatenate([seconds, sent])
         has = seconds > 0
         #: the share of an activity that is left after a step, by neuron
         self._left = np.zeros(len(seconds))
@@ -65,8 +82,12 @@ class Fading:
         longest = float(self._left.max(initial=0.0))
         return math.log(_FAINTEST) / math.log(longest) if 0 < longest < 1 else longest * math.inf
 
-    def follow(self, steps: IntArray, rows: FloatArray) -> FloatArray:
-        """Take the activities ``rows`` (steps, n) of the next steps; gives what a picture shows at the last of them."""
+    def follow(self, steps: IntArray, rows: FloatArray, sent: FloatArray | None = None) -> FloatArray:
+        """Take the activities ``rows`` (steps, n) of the next steps, and what was ``sent`` beside them (steps, k), None
+        where that is not known or nothing of it fades; gives what a picture shows of activities at the last of them."""
+        if self.sends:
+            unknown = np.full((len(rows), len(self._left) - self._count), np.nan)
+            rows = np.concatenate([rows, unknown if sent is None else sent], axis=1)
         for first in range(0, len(steps), _CHUNK):
             some, now = rows[first : first + _CHUNK], steps[first : first + _CHUNK]
             if len(self._shown):
@@ -75,7 +96,8 @@ class Fading:
                 faded = (some * self._left ** (now[-1] - now)[:, None])[::-1]  # what is no number is as nothing
             furthest = np.nan_to_num(np.abs(faded), nan=0.0).argmax(axis=0)  # of equal ones the latest
             self._step, self._shown = int(now[-1]), faded[furthest, np.arange(faded.shape[1])]
-        return self._shown
+        self.sent = self._shown[self._count :] if self.sends else None
+        return self._shown[: self._count]
 
 
 def snapshots_of(network: Network, recording: Recording, steps: Iterable[int]) -> Iterator[Snapshot]:
@@ -89,7 +111,7 @@ def snapshots_of(network: Network, recording: Recording, steps: Iterable[int]) -
         if states:
             now = states.put(snapshot.activity, recording.states[recording.row(step), columns])
             snapshot = replace(snapshot, shown=now)
-        if sending is not None:
+        if sending is not None and not fading.sends:
             row = recording.row(step)
             (sent,) = sending.rows(slice(row, row + 1))
             snapshot = replace(snapshot, sent=sent)
@@ -99,6 +121,9 @@ def snapshots_of(network: Network, recording: Recording, steps: Iterable[int]) -
             row = recording.row(step)
             done = max(done, int(np.searchsorted(recording.step, step - fading.reach)))
             rows = slice(done, row + 1)
-            seen = fading.follow(recording.step[rows], recording.activity[rows])
+            beside = None if sending is None or not fading.sends else sending.rows(rows)
+            seen = fading.follow(recording.step[rows], recording.activity[rows], beside)
             snapshot, done = replace(snapshot, seen=seen), row + 1
+            if beside is not None:
+                snapshot = replace(snapshot, sent=fading.sent)
         yield snapshot

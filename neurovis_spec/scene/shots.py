@@ -104,10 +104,12 @@ def snapshots_of_run(run: Simulation, look: Look) -> Iterator[Snapshot]:
     for step in range(start + look.count):
         pose, ends = run.pose, set_ends.of_run(run)
         run.step()
+        wanted = step >= start and (step - start) % look.every == 0
+        sent = signals.of_run(run) if wanted or fading.sends else None
         if fading:
-            seen = fading.follow(np.array([step]), run.activity[None])
-        if step >= start and (step - start) % look.every == 0:
-            shown, sent = states.of_run(run), signals.of_run(run)
+            seen = fading.follow(np.array([step]), run.activity[None], None if sent is None else sent[None])
+        if wanted:
+            shown, sent = states.of_run(run), fading.sent if fading.sends else sent
             yield Snapshot(step, run.activity, weights, before, seen, pose, run.sensed, shown, sent, ends)
         before, weights = weights, run.connection_weights if len(network.changing) else weights
 

@@ -18,9 +18,13 @@ import numpy.typing as npt
 
 from neurovis_spec.arguments import callers_level
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.flows import reads
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import SYNAPSE
 from neurovis_spec.diagnostics import listed
 from neurovis_spec.runtime.columns import Probe, probe_of
+from neurovis_spec.runtime.events import are_spikes
+from neurovis_spec.runtime.stages import taken_by
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording, Snapshot
@@ -97,6 +101,22 @@ class Signals:
         alone = len(names) == 1 and bool((self._sources >= len(self.network.neurons)).all())
         plain = f"w·{names.pop() if alone else 'what is sent' if names else 'a'}"
         return f"{plain}, or of a synapse" if synapses else plain
+
+    @cached_property
+    def spikes(self) -> Mask:
+        """Which of the k numbers are spikes, or signals that synapses form of a spike: they last for one step."""
+        are = are_spikes(self.network)
+        found = are[len(self.network.neurons) + self.network.taken]
+        read = np.zeros(len(self.network.connections), np.bool_)
+        sent = taken_by(self.network)
+        for projection in self.network.projections:
+            if projection.kind == SYNAPSE:
+                definition = projection.use.definition
+                for name in reads(definition, [definition.given.each_step]):
+                    ends = sent[projection.members] if name == "pre" else projection.ends.get(name)
+                    if ends is not None:
+                        read[projection.members] |= are[ends]
+        return np.concatenate([found, read[self.network.joined]])
 
     @cached_property
     def _probe(self) -> Probe:
