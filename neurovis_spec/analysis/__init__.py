@@ -6,6 +6,7 @@ docs/measures.md lists all measures, with equations and sources.
 
 from __future__ import annotations
 
+from neurovis_spec.analysis.firing import around, correlogram, firing, group_firing, intervals, rates
 from neurovis_spec.analysis.gait import gait, stretches
 from neurovis_spec.analysis.recorded import (
     awake_at_once,
@@ -24,15 +25,21 @@ from neurovis_spec.runtime.pairwise import coactivation, cross_correlation, mutu
 __all__ = [
     "Axis",
     "NamedArray",
+    "around",
     "awake_at_once",
     "coactivation",
     "connection_matrix",
+    "correlogram",
     "cross_correlation",
     "cut",
+    "firing",
     "gait",
+    "group_firing",
     "importance",
+    "intervals",
     "mutual_information",
     "printed_correlation",
+    "rates",
     "sensitivity",
     "stretches",
     "topography",

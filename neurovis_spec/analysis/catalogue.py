@@ -21,7 +21,8 @@ it, and returns a named array: `table["K2", "K3"]`, `table.row("K2")`, `table.co
 `of` chooses neurons (`"K"`, `"C + K"`, `["K1", "O"]`), `start` and `stop` choose steps. The folder of
 `neurovis analyze` is `neurovis_spec.analysis.report.analyze(network, folder, recording)`.
 
-The examples are of use case 1, the last twenty periods, and they are tested:
+The examples are of use case 1, the last twenty periods, and, where neurons spike, of the one that hears where a sound
+is. They are tested:
 
 ```python
 >>> import neurovis_spec as nv
@@ -29,6 +30,7 @@ The examples are of use case 1, the last twenty periods, and they are tested:
 >>> network = nv.compile("specs/cpg_rbf.yaml")
 >>> recording = network.run()
 >>> late = 12_000 - 2_572
+>>> sound = nv.compile("specs/sound.yaml").run()
 
 ```
 """

@@ -6,7 +6,7 @@ In: tables, a Theme. Out: Scenes, which every renderer draws.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -159,23 +159,31 @@ def _height(value: float) -> float:
     return value if np.isfinite(value) else -1.0
 
 
-def curves(
-    names: Sequence[str],
-    values: FloatArray,
-    steps: IntArray,
-    dt: StepLength | None,
-    title: str,
-    what: str,
-    theme: Theme,
-) -> Scene:
+@dataclass(frozen=True, eq=False)
+class Along:
+    """What curves run along: steps (rows,) and how long one is shown to be; ``what`` these are, and the ``caption``."""
+
+    steps: IntArray
+    dt: StepLength | None
+    what: str = "time"
+    caption: str = ""
+
+    @property
+    def said(self) -> str:
+        """The caption; without one of its own which steps there are."""
+        return self.caption or _span_said(self.steps)
+
+
+def curves(names: Sequence[str], values: FloatArray, along: Along, title: str, what: str, theme: Theme) -> Scene:
     """Curves over time, (steps, names), a few to a strip."""
     parts = [(name.replace("->", "→"), "") if "->" in name else texts.with_subscript(name) for name in names]
     lines = tuple(Trace(*parts[place], values[:, place], values[-1:, place], name) for place, name in enumerate(names))
     plots = Traces("traces", what, lines)
-    span = Span(steps, steps[-1:], MARGIN + plots.left, WIDTH - MARGIN - plots.right, dt)
+    steps = along.steps
+    span = Span(steps, steps[-1:], MARGIN + plots.left, WIDTH - MARGIN - plots.right, along.dt, along.what)
     part = plots.part(span, _PLOT, True, theme, "p")
     drawn = [group for group in part.groups if "cursor" not in group.data and "moment" not in group.data]
-    head = Group((title_text(title, WIDTH, theme), caption_text(_span_said(steps), WIDTH, theme)), "head")
+    head = Group((title_text(title, WIDTH, theme), caption_text(along.said, WIDTH, theme)), "head")
     groups = [head, *(_lowered(group, HEADER) for group in drawn)]
     return Scene(WIDTH, HEADER + part.height + 8, theme, title, tuple(groups))
 

@@ -16,8 +16,10 @@ import numpy.typing as npt
 
 from neurovis_spec.analysis import pictures
 from neurovis_spec.analysis.catalogue import catalogue
+from neurovis_spec.analysis.firing import around, correlogram, firing, group_firing, intervals, rates
 from neurovis_spec.analysis.gait import gait, stretches
 from neurovis_spec.analysis.page import PAGE, Shown, page_of
+from neurovis_spec.analysis.pictures import Along
 from neurovis_spec.analysis.recorded import (
     awake_at_once,
     connection_matrix,
@@ -47,6 +49,10 @@ from neurovis_spec.scene.themes import theme_of
 
 #: The most curves of a picture, bars of a ranking, rows of a table over time, and neurons of a gait diagram.
 _CURVES, _BARS, _ROWS, _LEGS = 24, 30, 2_000, 40
+#: Measures of spikes, which a report has where neurons spike, and the last one where there are episodes.
+OF_SPIKES = ("firing", "intervals", "correlogram", "episodes")
+#: Groups and neurons of a cross-correlogram: a column for each pair of these.
+_GROUPS = 8
 #: Pictures of activities over time show so many of the last rows, so that their shape is seen.
 _SEEN = 600
 #: Trials that take longer than so many updates of a neuron or a connection are left out.
@@ -82,7 +88,7 @@ class Reading:
 
 def file_names() -> tuple[str, ...]:
     """All files that a report may write."""
-    stems = [*catalogue(), "coactivation_total", "active_at_once", "weight_changes", "raster"]
+    stems = [*catalogue(), "coactivation_total", "active_at_once", "weight_changes", "raster", "group_firing", "rates"]
     return (PAGE, *(f"{stem}{suffix}" for stem in stems for suffix in (".csv", ".json", ".svg")))
 
 
@@ -165,6 +171,11 @@ class _Report:
             "updates": self._updates,
             "gait": self._gait,
         }
+        if self.recording.spiking is not None:
+            of_spikes = self._firing, self._intervals, self._correlogram, self._episodes
+            makers |= dict(zip(OF_SPIKES, of_spikes, strict=True))
+            if self.network.network.episode is None:
+                del makers["episodes"]
         for key, make in makers.items():
             yield _left_out(key, make)
         yield from self._trials()
@@ -198,7 +209,9 @@ class _Report:
         made, part = traces(self.recording, self.options.of), excerpt(self._late, self.options.of)
         drawn, notes = {}, self._late_only()
         if len(part.names) <= _CURVES:
-            scene = pictures.curves(part.names, part.activity, part.step, self._dt, "Traces", "activity", self.theme)
+            scene = pictures.curves(
+                part.names, part.activity, Along(part.step, self._dt), "Traces", "activity", self.theme
+            )
             drawn["traces"] = self._draw(scene)
         else:
             notes.append(f"{len(part.names):,} curves are too many for a picture: choose up to {_CURVES} with --of.")
@@ -253,7 +266,7 @@ class _Report:
             raise RecordingError("no weight can change")
         thin, said = _thinned(made)
         names, values, more = self._most_changed(made, changes)
-        scene = pictures.curves(names, values, self.recording.step, self._dt, "Weights", "weight", self.theme)
+        scene = pictures.curves(names, values, Along(self.recording.step, self._dt), "Weights", "weight", self.theme)
         return Reading("weights", {"weight_changes": changes, "weights": thin}, {"weights": self._draw(scene)},
                        (*more, *said))  # fmt: skip
 
@@ -265,7 +278,9 @@ class _Report:
             raise RecordingError("one step alone has no updates")
         thin, said = _thinned(made)
         names, values, more = self._most_changed(made, changes)
-        scene = pictures.curves(names, values, self.recording.step[:-1], self._dt, "Updates", "update", self.theme)
+        scene = pictures.curves(
+            names, values, Along(self.recording.step[:-1], self._dt), "Updates", "update", self.theme
+        )
         return Reading("updates", {"updates": thin}, {"updates": self._draw(scene)}, (*more, *said))
 
     def _most_changed(
@@ -293,6 +308,43 @@ class _Report:
         found = stretches(self._late, of, threshold=threshold)
         scene = pictures.diagram(found, made, self._late.step, self._dt, "Gait diagram", self.theme)
         return Reading("gait", {"gait": made}, {"gait": self._draw(scene)}, tuple(self._late_only()))
+
+    def _firing(self) -> Reading:
+        recording, of = self.recording, self.options.of
+        tables = {"firing": firing(recording, of), "group_firing": group_firing(recording, of)}
+        over_time = rates(recording, of)
+        caption = f"the mean of each group in {len(over_time.rows.labels)} bins"
+        drawn, notes = self._over(over_time, "Firing rates", "time", caption)
+        return Reading("firing", {**tables, "rates": over_time}, {"rates": drawn}, notes)
+
+    def _intervals(self) -> Reading:
+        made = intervals(self.recording, self.options.of)
+        drawn, notes = self._over(made, "Intervals", "interval", "shares of all intervals of a group")
+        return Reading("intervals", {"intervals": made}, {"intervals": drawn}, notes)
+
+    def _correlogram(self) -> Reading:
+        count = len(group_firing(self.recording, self.options.of).rows.labels)
+        if count > _GROUPS:
+            raise RecordingError(f"{count:,} groups and neurons are too many pairs: choose up to {_GROUPS} with --of")
+        made = correlogram(self.recording, self.options.of)
+        drawn, notes = self._over(made, "Cross-correlogram", "lag", "the rate of the second around spikes of the first")
+        return Reading("correlogram", {"correlogram": made}, {"correlogram": drawn}, notes)
+
+    def _episodes(self) -> Reading:
+        steps = self.network.network.episode
+        assert steps is not None
+        made = around(self.recording, steps, self.options.of)
+        drawn, notes = self._over(made, "Rates in an episode", "time in the episode", "the mean of all whole episodes")
+        return Reading("episodes", {"episodes": made}, {"episodes": drawn}, notes)
+
+    def _over(self, table: NamedArray, title: str, what: str, caption: str) -> tuple[bytes, tuple[str, ...]]:
+        """Curves of the columns of a table over its bins, of many the first."""
+        names, steps = table.columns.labels[:_CURVES], np.array([int(one) for one in table.rows.labels], np.int64)
+        more = len(table.columns.labels) - len(names)
+        notes = (f"The picture has the first {_CURVES} of {len(names) + more:,}.",) if more else ()
+        along = Along(steps, self._dt, what, caption)
+        unit = table.unit or "share"
+        return self._draw(pictures.curves(names, table.values[:, : len(names)], along, title, unit, self.theme)), notes
 
     def _trials(self) -> Iterator[Reading]:
         keys = ("importance", "sensitivity")

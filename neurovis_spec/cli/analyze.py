@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -36,6 +38,9 @@ from neurovis_spec.cli.options import (
     theme_option,
 )
 from neurovis_spec.cli.progress import progress
+
+#: groups that spike are printed up to so many
+_MOST_GROUPS: Final = 20
 
 
 @dataclass(frozen=True)
@@ -115,7 +120,8 @@ def command(
 
     The page says what each measure means. The measures are those of the NeuroVis paper: connection matrix, traces,
     topography, cross-correlation, mutual information, co-activation, weights and their updates, the gait diagram, and
-    what the outputs lose and gain with each part. What cannot be measured is left out, and the page says why.
+    what the outputs lose and gain with each part; where neurons spike their rates, intervals and cross-correlograms,
+    and rates over episodes. What cannot be measured is left out, and the page says why.
     """
     need_run(inputs, recording)
     start, stop = measuring.start, measuring.stop
@@ -146,4 +152,17 @@ def command(
     )
     with progress("measuring") as bar, writing(output):
         files = analyze(network, output, record, options, bar)
+    _print_firing(files)
     click.echo(f"{output}: {count(len(files), 'file')}; open {output / 'index.html'}")
+
+
+def _print_firing(files: Sequence[Path]) -> None:
+    """How the groups fire, where they do."""
+    from neurovis_spec.cli.tables import table
+
+    path = next((path for path in files if path.name == "group_firing.csv"), None)
+    if path is not None:
+        header, *rows = csv.reader(path.read_text(encoding="utf-8").splitlines())
+        told = [(name, *(f"{float(value):.4g}" if value else "–" for value in values)) for name, *values in rows]
+        units = {"rate": "rate (1/s)", "interval": "interval (s)"}
+        click.echo(table(told[:_MOST_GROUPS], ("", *(units.get(name, name) for name in header[1:]))))

@@ -29,13 +29,15 @@ _TICK = 4.0
 @dataclass(frozen=True)
 class Span:
     """The steps (rows,) that strips show, from ``left`` to ``right`` (user units), and the steps of the frames (f,).
-    ``dt`` is how long a step is shown to be, None where the spec of the network does not say it."""
+    ``dt`` is how long a step is shown to be, None where the spec of the network does not say it; ``what`` is what they
+    count: time, or lags."""
 
     steps: IntArray
     frames: IntArray
     left: float
     right: float
     dt: StepLength | None
+    what: str = "time"
 
     @property
     def stride(self) -> float:
@@ -78,7 +80,8 @@ def time_axis(span: Span, bottom: float, theme: Theme) -> list[Shape]:
         (x,) = span.at(np.array([value / unit])).tolist()
         shapes.append(Polyline(((x, bottom), (x, bottom + _TICK)), theme.muted, 1.0))
         shapes.append(Text((x, bottom + 16.0), said, SMALL, theme.muted, "middle"))
-    name = "step" if span.dt is None else f"time ({span.dt.unit})"
+    name = f"{span.what} ({'steps' if span.dt is None else span.dt.unit})"
+    name = "step" if name == "time (steps)" else name
     shapes.append(Text(((span.left + span.right) / 2, bottom + 30.0), name, SMALL, theme.muted, "middle"))
     return shapes
 

@@ -1,0 +1,165 @@
+"""What spikes tell: rates, intervals, counts, correlograms and episodes, by trains that are known and by hand."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import neurovis_spec as nv
+from neurovis_spec import analysis
+from neurovis_spec.analysis import report
+from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.recording import Recording
+
+SPEC = """\
+neurovis: 1
+name: few
+time: {dt: 1 ms, steps: 200, episode: 50}
+models: {cell: {time: ms, state: {v: {derivative: (drive - v)/20}}, spike: {when: v >= 1, set: {v: 0}}}}
+neurons: {K: {count: 2, model: cell, bias: [1.3, 1.6]}, H: {model: cell, bias: 2}, O: {}}
+connections: {K -> O: {weight: 1}}
+"""
+NETWORK = nv.compile_text(SPEC)
+RUN = NETWORK.run(backend="reference")
+
+
+def with_trains(trains: list[list[int]], stop: int) -> Recording:
+    """The recording with these spikes of K1, K2 and H, of steps 0 to before ``stop``."""
+    spikes = sorted((step, neuron) for neuron, train in enumerate(trains) for step in train)
+    steps, neurons = (np.array(column, np.int64) for column in (zip(*spikes, strict=True) if spikes else ((), ())))
+    return replace(RUN, spike_steps=steps, spike_neurons=neurons, spike_range=(0, stop))
+
+
+def test_a_clock_and_chance() -> None:
+    """Of a clock CV and Fano factor are 0; of a Poisson process both are 1."""
+    random = np.random.default_rng(1)
+    chance = np.flatnonzero(random.uniform(size=400_000) < 0.01).tolist()
+    made = analysis.firing(with_trains([list(range(5, 400_000, 100)), chance, []], 400_000), windows=400)
+    assert made["K1", "spikes"] == 4000
+    assert made["K1", "rate"] == pytest.approx(10)
+    assert made["K1", "interval"] == pytest.approx(0.1)
+    assert made["K1", "CV"] == made["K1", "Fano factor"] == 0
+    assert made["K2", "CV"] == pytest.approx(1, abs=0.05)
+    assert made["K2", "Fano factor"] == pytest.approx(1, abs=0.15)
+    assert made["H", "rate"] == 0
+    assert np.isnan([made["H", name] for name in ("interval", "CV", "Fano factor")]).all()
+
+
+def test_groups_are_means_of_their_neurons() -> None:
+    made, groups = analysis.firing(RUN), analysis.group_firing(RUN)
+    assert groups.rows.labels == ("K", "H")
+    assert groups["K", "neurons"] == 2
+    assert groups["K", "spikes"] == made["K1", "spikes"] + made["K2", "spikes"] == len(RUN.spikes("K").times)
+    for name in ("rate", "interval", "CV"):
+        assert groups["K", name] == pytest.approx((made["K1", name] + made["K2", name]) / 2)
+    over = analysis.rates(RUN, bins=20)
+    assert over.values.sum(axis=0) * 0.01 == pytest.approx([groups["K", "spikes"] / 2, groups["H", "spikes"]])
+    assert over.rows.labels[:2] == ("0", "10")
+    assert analysis.group_firing(RUN, "K1 + H").rows.labels == ("K1", "H")  # not all of K
+
+
+def test_steps_and_neurons_are_chosen() -> None:
+    late = analysis.firing(RUN, "K2 + O", 100, 200)
+    assert late.rows.labels == ("K2",)
+    assert late["K2", "spikes"] == (RUN.spikes("K2").times >= 0.1 - 1e-9).sum()
+    assert late["K2", "rate"] == pytest.approx(late["K2", "spikes"] / 0.1)
+    with pytest.raises(RecordingError, match="none of these neurons spikes"):
+        analysis.firing(RUN, "O")
+    with pytest.raises(RecordingError, match="nothing to measure from 500 to before 200"):
+        analysis.firing(RUN, start=500)
+    with pytest.raises(RecordingError, match="holds no spikes"):
+        analysis.firing(replace(RUN, spiking=None))
+
+
+def test_rows_that_are_not_kept_change_nothing() -> None:
+    few = NETWORK.run(backend="reference", every=40)
+    np.testing.assert_array_equal(analysis.firing(few), analysis.firing(RUN))
+    np.testing.assert_array_equal(analysis.correlogram(few), analysis.correlogram(RUN))
+
+
+def test_intervals_are_shares() -> None:
+    run = with_trains([[0, 10, 20, 30], [0, 20, 40], [7]], 100)
+    made = analysis.intervals(run, bins=100)
+    assert made["10", "K"] == pytest.approx(3 / 5)
+    assert made["20", "K"] == pytest.approx(2 / 5)
+    assert made.column("H").sum() == 0
+    with pytest.raises(RecordingError, match="no neuron fires twice"):
+        analysis.intervals(with_trains([[3], [5], []], 100))
+
+
+TRAIN = st.lists(st.integers(0, 99), max_size=12, unique=True)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.tuples(TRAIN, TRAIN, TRAIN), st.integers(1, 60), st.integers(1, 30))
+def test_a_correlogram_counts_pairs(trains: tuple[list[int], ...], reach: int, bins: int) -> None:
+    made = analysis.correlogram(with_trains([*trains], 100), reach=reach / 1000, bins=bins)
+    assert made.columns.labels == ("K, K", "K, H", "H, H")
+    middles = [int(label) for label in made.rows.labels]
+    width = middles[1] - middles[0]
+    assert middles[len(middles) // 2] == 0
+    assert width % 2 == 1
+    groups = {"K": (0, 1), "H": (2,)}
+    for column in made.columns.labels:
+        one, other = (groups[name] for name in column.split(", "))
+        sent = sum(len(trains[a]) for a in one)
+        for middle in middles:
+            pairs = sum(
+                abs(t - s - middle) <= width // 2
+                for a in one for b in other if (a != b) or len(one) == 1
+                for s in trains[a] for t in trains[b] if not (a == b and s == t)
+            )  # fmt: skip
+            size = max(sent, 1) * max(len(other) - (one == other), 1) * width * 0.001 * (1 - abs(middle) / 100)
+            assert made[str(middle), column] == pytest.approx(pairs / size, abs=1e-6)
+
+
+def test_of_independent_trains_it_is_the_rate_everywhere() -> None:
+    random = np.random.default_rng(2)
+    trains = [np.flatnonzero(random.uniform(size=50_000) < 0.02).tolist() for _ in range(3)]
+    made = analysis.correlogram(with_trains(trains, 50_000), reach=10.0, bins=20)
+    assert made.values == pytest.approx(20, rel=0.1)
+
+
+def test_what_follows_in_each_episode() -> None:
+    run = with_trains([[10, 60, 110], [10, 60, 149], [30, 199]], 199)  # the last episode is not whole
+    made = analysis.around(run, 50, bins=50)
+    assert made.column("K")[10] == pytest.approx(1000 * 5 / 6)
+    assert made.column("K")[49] == pytest.approx(1000 / 6)
+    assert made.column("H")[30] == pytest.approx(1000 / 3)
+    assert made.values.sum() == pytest.approx(1000 * (1 + 1 / 3))
+    with pytest.raises(RecordingError, match="no episode of 500 steps is whole"):
+        analysis.around(RUN, 500)
+
+
+def test_the_report_has_them_where_neurons_spike(tmp_path: Path) -> None:
+    report.analyze(NETWORK, tmp_path / "spiking", RUN, report.ReportOptions(trials=False))
+    files = {path.name for path in (tmp_path / "spiking").iterdir()}
+    for stem in ("rates", "intervals", "correlogram", "episodes"):
+        assert {f"{stem}.svg", f"{stem}.csv", f"{stem}.json"} <= files
+    assert files <= set(report.file_names())
+    page = (tmp_path / "spiking" / "index.html").read_text(encoding="utf-8")
+    assert "Softky and Koch" in page
+    assert "σ(Δt_i)" in page
+    found = json.loads((tmp_path / "spiking" / "group_firing.json").read_text(encoding="utf-8"))
+    assert "K" in json.dumps(found)
+    quiet = nv.compile_text("neurovis: 1\nname: quiet\ntime: {steps: 20}\nneurons: {O: {count: 2}}\n")
+    report.analyze(quiet, tmp_path / "quiet", None, report.ReportOptions(trials=False))
+    assert "firing.csv" not in {path.name for path in (tmp_path / "quiet").iterdir()}
+
+
+def test_the_command_prints_how_groups_fire(tmp_path: Path) -> None:
+    (tmp_path / "few.yaml").write_text(SPEC, encoding="utf-8")
+    arguments = ["analyze", str(tmp_path / "few.yaml"), "--no-trials", "-o", str(tmp_path / "found"), "--of", "K + H"]
+    said = CliRunner().invoke(neurovis, arguments).output
+    assert re.search(r"^ +neurons +spikes +rate \(1/s\) +interval \(s\) +CV +Fano factor$", said, re.MULTILINE)
+    groups = analysis.group_firing(RUN)
+    assert re.search(rf"^  K +2 +{groups['K', 'spikes']:g} +{groups['K', 'rate']:.4g} ", said, re.MULTILINE)
