@@ -271,3 +271,32 @@ def test_states_and_signals_are_chosen_and_pinned(tmp_path: Path) -> None:
             await opened.until("document.querySelectorAll('.trace').length == 1")
 
     asyncio.run(main())
+
+
+def test_a_strip_of_a_potential_has_marks_where_it_fires(tmp_path: Path) -> None:
+    spec = """neurovis: 1
+name: fires
+time: {dt: 1 ms, steps: 400}
+models: {cell: {time: ms, state: {v: {derivative: (drive - v)/20}}, spike: {when: v >= 1, set: {v: 0}}}}
+neurons: {K: {model: cell, bias: 1.5}}
+"""
+    (tmp_path / "fires.yaml").write_text(spec, encoding="utf-8")
+
+    async def main() -> None:
+        async with shown(str(tmp_path / "fires.yaml"), tmp_path) as (opened, _, _):
+            await opened.until(f"{STEP} > 100")
+            await pause(opened)
+            await opened.key("]")
+            await opened.until(f"{TRACE.format(0)}?.startsWith('K')")
+            #: pixels with ink in a row that marks alone reach
+            above = (
+                "(c => [...c.getContext('2d').getImageData(0, 2, c.width, 1).data].filter((value, at) => "
+                "at % 4 == 3 && value > 100).length)(document.querySelector('.trace'))"
+            )
+            await opened.ask("(s => { s.value = 'v'; s.onchange(); return 1 })(document.querySelector('.what'))")
+            await opened.until(f"{TRACE.format(0)}?.startsWith('K, v')")
+            assert (await numbers(opened, above))[0] > 3
+            await opened.ask("(s => { s.value = 'spike'; s.onchange(); return 1 })(document.querySelector('.what'))")
+            await opened.until(f"{TRACE.format(0)}?.startsWith('K, spike')")
+
+    asyncio.run(main())

@@ -9,6 +9,9 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.live.history import Bins, Members
+from neurovis_spec.live.recorded import RecordedSource
+from neurovis_spec.runtime.quantities import Quantities
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.scene import THEMES, Group, Image, Polyline, Scene, Text
@@ -151,3 +154,21 @@ def test_the_legend_tells_that_spikes_fade_where_no_activity_does() -> None:
             if isinstance(one, Text)
         }
         assert words in shown
+
+
+def test_the_live_page_has_the_spikes_of_a_recording_without_their_state() -> None:
+    """As events, also between its rows; of what is recorded as a state, the same."""
+    names = Quantities(NETWORK.network).names
+    place = names.index("K1.spike")
+    for options in ({}, {"states": ["K.spike"]}):
+        source = RecordedSource(NETWORK.network, NETWORK.run(backend="reference", **options))  # type: ignore[arg-type]
+        seen = source.history.read(Members("quantities", np.array([place])), Bins(0, 1, 120))
+        np.testing.assert_array_equal(seen[:, 1], RUN["K1"])
+        source.go(int(RUN.spike_steps[RUN.spike_neurons == 0][0]))
+        assert source.quantities is not None
+        assert source.quantities[place] == 1
+    few = RecordedSource(NETWORK.network, NETWORK.run(backend="reference", every=20))
+    seen = few.history.read(Members("quantities", np.array([place])), Bins(0, 20, 6))
+    np.testing.assert_array_equal(seen[:, 1], RUN["K1"].reshape(6, 20).max(axis=1))
+    unknown = few.history.read(Members("quantities", np.array([names.index("K1.v")])), Bins(0, 20, 6))
+    assert np.isnan(unknown).all()

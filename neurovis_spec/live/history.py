@@ -138,11 +138,19 @@ class Ring:
 
 class Recorded:
     """The steps of a recording, which holds all activities and weights; ``told`` (rows, n) is what traces of neurons
-    show, by default the activities; ``columns`` (k,) are those of the quantities, −1 of one that it does not hold."""
+    show, by default the activities; ``columns`` (k,) are those of the quantities, −1 of one that it does not hold;
+    ``spiking`` (k,) says whose spike one is, −1 of what is none: these it has as events."""
 
-    def __init__(self, recording: Recording, told: FloatArray | None = None, columns: IntArray | None = None) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        told: FloatArray | None = None,
+        columns: IntArray | None = None,
+        spiking: IntArray | None = None,
+    ) -> None:
         self._recording, self._told = recording, recording.activity if told is None else told
         self._quantities = np.zeros(0, np.int64) if columns is None else columns
+        self._spiking = np.full(len(self._quantities), -1, np.int64) if spiking is None else spiking
         self._column = np.full(len(recording.sources), -1, np.int64)
         self._column[recording.plastic] = np.arange(len(recording.plastic))
         self._fixed = np.zeros(len(recording.sources))
@@ -159,7 +167,22 @@ class Recorded:
             columns = self._quantities[members.indices]
             values = np.full((len(rows), len(columns)), np.nan)
             values[:, columns >= 0] = self._recording.states[rows[:, None], columns[columns >= 0]]
+            self._put_spikes(values, steps[rows], self._spiking[members.indices])
         else:
             column, values = self._column[members.indices], np.tile(self._fixed[members.indices], (len(rows), 1))
             values[:, column >= 0] = self._recording.weights[rows[:, None], column[column >= 0]]
         return _ranges(steps[rows], _joined(members, values), bins)
+
+    def _put_spikes(self, values: FloatArray, steps: IntArray, neurons: IntArray) -> None:
+        """Put the spikes of these neurons into the columns of values (rows, columns) where there are some, each into
+        the row of its step, or into the one before it."""
+        recording = self._recording
+        if not len(steps) or (neurons < 0).all():
+            return
+        values[:, neurons >= 0] = 0.0
+        column = np.full(len(recording.neurons), -1, np.int64)
+        column[neurons[neurons >= 0]] = np.flatnonzero(neurons >= 0)
+        first, last = np.searchsorted(recording.spike_steps, [steps[0], steps[-1] + 1])
+        columns = column[recording.spike_neurons[first:last]]
+        row = np.searchsorted(steps, recording.spike_steps[first:last], "right") - 1
+        values[row[columns >= 0], columns[columns >= 0]] = 1.0

@@ -72,7 +72,7 @@ _WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}(\.[A-Za-z_]\w{0,4095})?", re.A
 #: The gains of Eqs. 2–5.
 _GAINS = ("activity", "signal", "thickness", "change")
 #: The most items that a client is sent traces of at once, the most bins, and steps in each.
-_TRACED, _BINS, _EVERY = 16, 2048, 1 << 32
+_TRACED, _BINS, _EVERY = 24, 2048, 1 << 32
 #: The most turns and events that are listed, the latest turns and the first events.
 _LISTED = 1000
 #: The most steps that are made at once.

@@ -13,6 +13,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import SPIKE
 from neurovis_spec.live.history import Recorded
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, drawn, recalled
 from neurovis_spec.live.turns import Turn
@@ -49,9 +50,13 @@ class RecordedSource:
         known = {name: column for column, name in enumerate(recording.state_names)}
         self._states = [known[name] for name in names] if names and known.keys() >= set(names) else None
         self._controls, self._state, self._applied = Controls(network), initial_state(network), 0
-        every = Quantities(network).names if known else ()
+        told = self._recording.spiking
+        every = Quantities(network).names if known or told is not None else ()
         self._columns = np.array([known.get(name, -1) for name in every], np.int64)
-        self.history = Recorded(self._recording, ShownStates(network).recorded(self._recording), self._columns)
+        spikes = {f"{network.neurons.names[index]}.{SPIKE}": index for index in ([] if told is None else told.tolist())}
+        self._spiking = np.array([spikes.get(name, -1) for name in every], np.int64)
+        shown = ShownStates(network).recorded(self._recording)
+        self.history = Recorded(self._recording, shown, self._columns, self._spiking)
 
     @property
     def step(self) -> int:
@@ -86,7 +91,11 @@ class RecordedSource:
     @property
     def quantities(self) -> FloatArray | None:
         """Those of the current step, NaN where the recording does not hold one."""
-        return np.where(self._columns < 0, np.nan, self._recording.states[self._row, self._columns])
+        recording = self._recording
+        now = recording.spike_neurons[recording.spike_steps == self.step]
+        spikes = np.where(self._spiking < 0, np.nan, np.isin(self._spiking, now))
+        states = recording.states[self._row]
+        return np.where(self._columns < 0, spikes, states[self._columns] if len(states) else np.nan)
 
     @property
     def backend(self) -> str:

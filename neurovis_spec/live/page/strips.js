@@ -16,8 +16,12 @@ import { THUMB } from './scrubber.js';
  * @typedef {{id: string, what: string, key: string, told: string, data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
  *   canvas: HTMLCanvasElement, ends: HTMLElement[], pin: HTMLButtonElement, parts: HTMLElement[]}} Strip */
 
-/** The most strips that are pinned; milliseconds between two traces that are asked for, and until one is asked for again. */
+/** What a model with a spike block has, 1 in the steps in which it fires. */
+const SPIKE = 'spike';
+
+/** The most strips that are pinned; how high marks of spikes are; milliseconds between two traces that are asked for, and until one is asked for again. */
 const PINS = 8,
+  MARK = 6,
   PACE = 40,
   LOST = 2000;
 
@@ -168,6 +172,11 @@ export class Strips {
     if (focused) (pin.checkVisibility({ visibilityProperty: true }) ? pin : this.scrubber.scrub).focus();
   }
 
+  /** By what the spikes are asked for that are marked in a strip; '' where none are. @param {Strip} strip */
+  marks({ id, what }) {
+    return id[0] === 'n' && what !== SPIKE && namesOf(this.link.scene, id).includes(SPIKE) ? `${id}.${SPIKE}` : '';
+  }
+
   /** Have the values of what is shown asked for. */
   want() {
     this.attention.also = [...this.pinned, this.held].map(({ key }) => key);
@@ -189,7 +198,8 @@ export class Strips {
     if (!look) return;
     const { low, high, events, known: turned } = this.scrubber,
       width = Math.max(1, this.held.canvas.clientWidth - 2 * THUMB);
-    const items = [...new Set([...this.pinned, this.held].map(({ key }) => key))].filter(Boolean);
+    const strips = [...this.pinned, this.held];
+    const items = [...new Set(strips.flatMap((strip) => [strip.key, this.marks(strip)]))].filter(Boolean);
     for (const { key, value } of [...this.pinned, this.held]) {
       const now = this.attention.values[key],
         words = key && now !== undefined ? signed(now) : '';
@@ -215,14 +225,15 @@ export class Strips {
     this.waiting = false;
     for (const strip of [...this.pinned, this.held]) {
       const trace = traces.ranges.get(strip.key);
-      if (trace) this.paint(strip, trace, traces);
+      if (trace) this.paint(strip, trace, traces, traces.ranges.get(this.marks(strip)));
     }
     this.show();
   }
 
-  /** Draw a trace: a line, up and down in each bin where it has several steps.
-   * @param {Strip} strip @param {Float32Array} trace @param {Traces} traces */
-  paint(strip, trace, { first, every }) {
+  /** Draw a trace: a line, up and down in each bin where it has several steps; above it marks where it fires, unless the
+   * trace itself shows that. @param {Strip} strip @param {Float32Array} trace @param {Traces} traces
+   * @param {Float32Array} [spikes] */
+  paint(strip, trace, { first, every }, spikes) {
     const { canvas } = strip,
       context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
     const { clientWidth: width, clientHeight: height } = canvas,
@@ -232,8 +243,10 @@ export class Strips {
     for (const value of trace) {
       if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
     }
+    const fired = spikes?.some((value, at) => value !== trace[at] && !Number.isNaN(value)) ? spikes : undefined;
     const known = low <= high,
-      room = height - 8;
+      top = fired ? 4 + MARK : 4,
+      room = height - 4 - top;
     [high, low].forEach((end, at) => {
       strip.ends[at].textContent = known && (at === 0 || high > low) ? short(end) : '';
     });
@@ -242,7 +255,7 @@ export class Strips {
     /** @param {number} step */
     const x = (step) => THUMB + scrubber.across(step) * (width - 2 * THUMB);
     /** @param {number} value */
-    const y = (value) => 4 + room * (high > low ? (high - Math.min(high, Math.max(low, value))) / (high - low) : 0.5);
+    const y = (value) => top + room * (high > low ? (high - Math.min(high, Math.max(low, value))) / (high - low) : 0.5);
     context.strokeStyle = style.borderTopColor;
     context.setLineDash([2, 3]);
     context.beginPath();
@@ -259,6 +272,18 @@ export class Strips {
     context.strokeStyle = style.color;
     context.lineWidth = 1.2;
     context.lineJoin = 'round';
+    for (let bin = 0; fired && 2 * bin < fired.length; bin++) {
+      const share = fired[2 * bin + 1];
+      if (!(share > 0)) continue;
+      // of what is collapsed the share of those that fire
+      context.globalAlpha = Math.min(1, Math.max(0.25, share));
+      const at = x(first + bin * every + (every - 1) / 2);
+      context.beginPath();
+      context.moveTo(at, 2);
+      context.lineTo(at, 1 + MARK);
+      context.stroke();
+    }
+    context.globalAlpha = 1;
     context.beginPath();
     let before = NaN;
     for (let bin = 0; 2 * bin < trace.length; bin++) {
