@@ -414,3 +414,32 @@ def test_levels_are_those_of_a_plain_reference(made: tuple[list[str], list[Wire]
     assert updated_before == {
         number for number, one in enumerate(network.populations) if one.level < levels[INTEGRATION]
     }
+
+
+@pytest.mark.parametrize(
+    ("given", "flows"), [("bias: {q: 1}", True), ("input: {q: hand}", False), ("noise: {q: 'normal(0, 1)'}", False)]
+)
+@pytest.mark.parametrize("more", ["", "- B -> A: {port: q, delay: 0, send: v}\n"])
+def test_what_is_held_at_a_port_is_held_whether_anything_is_connected_there(given: str, flows: bool, more: str) -> None:
+    text = f"""\
+inputs: {{hand: {{}}}}
+neurons: {{A: {{model: cell, {given}}}, B: {{model: cell}}}}
+connections:
+- A -> B: {{delay: 0}}
+{more}"""
+    if not flows:  # it is made behind the integration, which would wait for it
+        assert errors(text) == {"delay-0-cycle"}
+        return
+    network = compiled(text)
+    (port,) = [port for one in network.populations for port in one.ports if port.name == "drive" and len(port.incoming)]
+    assert port.staged is not None
+
+
+def test_a_neuron_sends_itself_a_state_into_a_port_that_what_it_sends_reads() -> None:
+    compiled("""\
+neurons: {A: {model: cell, bias: 1}, B: {model: cell}}
+connections:
+- A -> A: {port: q, send: v, delay: 0}
+- A -> B: {port: drive, send: rate, delay: 0}
+- B -> A: {port: drive, send: rate, delay: 0}
+""")

@@ -335,6 +335,40 @@ def test_units_at_the_ends_of_connections_are_known_where_they_are_in_use() -> N
     assert one.span.line == 14
 
 
+SET = """\
+parameters: {{tau_m: {{value: 20, unit: {unit}}}, Cm: {{value: 1, unit: uF/cm^2}}, q: 3, w: {{value: 1, unit: gulps}}}}
+models:
+  lif:
+    time: ms
+    parameters: {{tau: {{value: 20, unit: ms}}}}
+    state: {{v: {{derivative: (drive - v)/tau}}}}
+    activity: v
+modules:
+  leg:
+    parameters: {{slow: {{value: 1, unit: {unit}}}}}
+    neurons: {{B: {{model: {{lif: {{tau: slow}}}}}}}}
+instances: {{left: {{module: leg}}}}
+neurons:
+  A: {{model: {{lif: {{tau: {tau}}}}}, bias: 0*q*w*tau_m*Cm}}
+  H: {{model: {{hodgkin_huxley: {{C: {C}}}}}}}
+"""
+
+
+def test_what_parameters_are_set_to_is_in_their_unit() -> None:
+    right = {"unit": "ms", "tau": "tau_m", "C": "Cm"}
+    assert told(SET.format(**right)) == []
+    for tau in ("2*tau_m", "q*tau_m", "w*tau_m", "20 ms", "3", '"max(tau_m, 3)"', "[20 ms]"):
+        assert told(SET.format(**right | {"tau": tau})) == []
+    assert told(SET.format(**right | {"unit": "s"})) == [
+        "slow in s: tau of lif is in ms, and is set to what is in s",
+        "tau_m in s: tau of lif is in ms, and is set to what is in s",
+    ]
+    assert told(SET.format(**right | {"tau": "tau_m + Cm"})) == ["Cm is in uF/cm^2, tau_m in ms"]
+    assert told(SET.format(**right | {"C": "tau_m"})) == [
+        "C of hodgkin_huxley is in µF/cm², and is set to what is in ms"
+    ]
+
+
 #: How a function changes where its arguments do by a factor, by how units go through it.
 DEGREES = {"same": 1.0, "compared": 0.0, "sign": 0.0, "root": 0.5}
 #: These round to whole numbers in whatever unit they are given, and so are not exact in this.

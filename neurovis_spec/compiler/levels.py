@@ -265,14 +265,14 @@ class _Coupled:
         def reading(port: str) -> BoolArray:
             return self.taken.of_models(lambda model, name: port in outputs[id(model)].get(sent_by(model, name), ()))
 
-        return {port: reading(port) for port in self.wired.lines}
+        return {port: reading(port) for port in dict.fromkeys((*self.wired.lines, *self.held))}
 
     @cached_property
     def _flowing(self) -> tuple[BoolArray, BoolArray]:
         """Whether what is taken of a neuron by a name flows (names, n), and what a connection brings (m,). What reads
         something that is held is held, too, and so on until nothing more is found."""
         n, taken = len(self.model), self.taken
-        mixed = {port: self.held.get(port, np.zeros(n, dtype=np.bool_)).copy() for port in self.wired.lines}
+        mixed = {port: self.held.get(port, np.zeros(n, dtype=np.bool_)).copy() for port in self.through}
         flowing = taken.of_models(lambda model, name: flows_by(model, name) is not None)
         delayed = ~self.wired.fluent & taken.waited_for
         bringing = ~delayed & (~self.synapse | taken.of_entries(signal_flows))
@@ -281,9 +281,9 @@ class _Coupled:
                 flowing &= ~(self.through[port] & values)
             bringing &= taken.all("pre", flowing) & taken.all("post", flowing)
             before = sum(int(values.sum()) for values in mixed.values())
-            for port, values in mixed.items():
+            for port in self.wired.lines:
                 arriving = self._arriving(port)
-                values[self.targets[arriving[~bringing[arriving]]]] = True
+                mixed[port][self.targets[arriving[~bringing[arriving]]]] = True
             if sum(int(values.sum()) for values in mixed.values()) == before:
                 return flowing, bringing
 
@@ -419,7 +419,7 @@ class _Coupled:
     def _levels_of_stage(self, always: BoolArray) -> IntArray | Cycle:
         """The same, where ``always`` are the connections (m,) whose target waits for whatever it takes."""
         edges, taken = [], self.taken
-        closing = self.made & np.logical_or.reduce([*self.through.values()])
+        closing = self.made & np.logical_or.reduce([self.through[port] for port in self.wired.lines])
         before = (taken.any("pre", closing) | always) & self.now
         behind = taken.any("post", closing)
         for port, (_, connections, sources, targets) in self.open.items():

@@ -440,13 +440,17 @@ def check_hidden(compiled: Compiled, findings: Findings) -> None:
 
 def _choices(compiled: Compiled) -> Iterator[tuple[str, Choice]]:
     """What groups and connections name, with the section that defines such."""
-    for section, _ in compiled.sections:
-        for group in section.neurons.values():
-            if group.activation is not None:
-                yield ACTIVATION.section, group.activation
-            if group.model is not None:
-                yield MODEL.section, group.model
-        for _, body in section.connections:
-            if body.synapse is not None:
-                yield SYNAPSE.section, body.synapse
-            yield from ((RULE.section, choice) for choice in body.plasticity)
+    return (choice for section, _ in compiled.sections for choice in choices_in(section))
+
+
+def choices_in(section: Section) -> Iterator[tuple[str, Choice]]:
+    """The same of a spec or a module."""
+    for group in section.neurons.values():
+        if group.activation is not None:
+            yield ACTIVATION.section, group.activation
+        if group.model is not None:
+            yield MODEL.section, group.model
+    for _, body in section.connections:
+        if body.synapse is not None:
+            yield SYNAPSE.section, body.synapse
+        yield from ((RULE.section, choice) for choice in body.plasticity)

@@ -14,15 +14,19 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.checks.definitions import choices_in
 from neurovis_spec.compiler.network import Network, Route
 from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, SYNAPSE, EndName, Kind
 from neurovis_spec.compiler.values.builtin import libraries
-from neurovis_spec.compiler.values.units import Fault, Sheet, Unequal, sheet_of
+from neurovis_spec.compiler.values.units import Equation, Fault, Sheet, Unequal, as_known, faults_of, sheet_of
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.dimensions import Misfit
-from neurovis_spec.language.expressions.tree import Tree, names
+from neurovis_spec.language.expressions.parser import parse
+from neurovis_spec.language.expressions.tree import ExpressionError, Tree, names
 from neurovis_spec.language.library import DefinitionModel, Library
-from neurovis_spec.language.units import NUMBER, Unit
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.units import NUMBER, Unit, measured
+from neurovis_spec.language.yaml.source import Scalar
 
 _KINDS: Final = (ACTIVATION, MODEL, RULE, SYNAPSE)
 
@@ -125,6 +129,7 @@ def check_units(compiled: Compiled, findings: Findings) -> None:
         sheet = sheets.alone(kind, name)
         for fault in _different(sheet):
             _tell(fault, sheet, findings)
+    _check_settings(compiled, sheets, findings)
     for (kind, name), uses in sheets.uses.items():
         if not sheets.alone(kind, name).faults:
             _check_uses(kind, name, uses, sheets, compiled, findings)
@@ -158,6 +163,35 @@ def _check_ports(sheet: Sheet, target: Sheet, use: Between, key: Span, findings:
             assert unit is not None
             message = f"'{sheet.name}' brings {sheet.told(brought)}, and '{port}' of '{target.name}' takes"
             findings.warning("unit", key, f"{message} {target.told(unit)}", _hint(brought, unit))
+
+
+def _check_settings(compiled: Compiled, sheets: Sheets, findings: Findings) -> None:
+    """Warn of parameters of definitions that are set to formulas in another unit, of parameters of the spec or of a
+    module that have one."""
+    for section, _ in compiled.sections:
+        labels = {name: one.measure for name, one in section.parameters.items() if one.measure}
+        for of, choice in choices_in(section) if labels else ():
+            kind = next(kind for kind in _KINDS if kind.section == of)
+            sheet = sheets.alone(kind, choice.name.value)
+            for entry in choice.settings.entries:
+                unit = sheet.known.get(entry.name) if entry.name in sheet.parts.parameters else None
+                if unit is None or not isinstance(entry.value, Scalar):
+                    continue
+                name = f"{entry.name} of {sheet.name}"
+                known = {**as_known(labels), name: unit}
+                seen = sheet._replace(known=known, written={**sheet.written, **labels})
+                for fault in faults_of(_setting(name, entry.value), known):
+                    _tell(fault, seen, findings)
+
+
+def _setting(name: str, node: Scalar) -> list[Equation]:
+    """What a parameter of a definition is set to, where that is a formula."""
+    if not isinstance(node.value, str) or measured(node.value) is not None:
+        return []
+    try:
+        return [Equation(name, "setting", Located(node.value, node), parse(node.value, random=True))]
+    except ExpressionError:  # it names an instance: of its parameters nothing is known here
+        return []
 
 
 def _different(sheet: Sheet) -> Iterator[Fault]:
@@ -224,6 +258,8 @@ def _unequal(fault: Fault, unequal: Unequal, sheet: Sheet) -> str:
             return f"{suspect}the noise of {name} is in {found}, its state in {whole} per root of {time}"
         case "refractory":
             return f"{suspect}the refractory time is in {found}, not in {whole}"
+        case "setting":
+            return f"{suspect}{name} is in {whole}, and is set to what is in {found}"
         case "let" | "outputs":
             return f"{suspect}{name} is in {found}, and is taken for {whole}"
         case _:

@@ -40,8 +40,10 @@ def _flows(compiled: Compiled, findings: Findings) -> None:
 
 def _units(compiled: Compiled, findings: Findings) -> None:
     """Units that do not fit. Most specs have none: nothing is imported then."""
-    own = (made.values() for library in compiled.libraries for made in library.definitions.values())
-    if any(model.parts().units for models in own for model in models):
+    definitions = (made.values() for library in compiled.libraries for made in library.definitions.values())
+    if any(one.unit is not None for section, _ in compiled.sections for one in section.parameters.values()) or any(
+        model.parts().units for models in definitions for model in models
+    ):
         from neurovis_spec.compiler.checks.units import check_units
 
         check_units(compiled, findings)
@@ -165,7 +167,7 @@ _CHECKS = (
     _Check(check_neurons, ("neurons",)),
     _Check(check_rules, ("connections",)),
     _Check(check_formulas, _DEFINITIONS),
-    _Check(_units, _DEFINITIONS),
+    _Check(_units, ("parameters", *_DEFINITIONS)),
     _Check(check_unused, _DEFINITIONS),
     _Check(check_modules, ("modules",)),
     _Check(check_hidden, ("neurons", "connections")),

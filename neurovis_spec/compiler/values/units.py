@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from neurovis_spec.compiler.program import Kind
+from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.expressions.dimensions import Misfit, read_units
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Name, Tree, names, walk
@@ -74,7 +75,7 @@ class Sheet(NamedTuple):
 
     def told(self, unit: Unit) -> str:
         """How a unit is written, in the author's words where they have it."""
-        return spelled(unit, self.written.values())
+        return shorten(spelled(unit, self.written.values()))
 
     @property
     def gives(self) -> str:
@@ -104,15 +105,19 @@ def sheet_of(kind: Kind, name: str, model: DefinitionModel, ends: Mapping[str, U
     assert time is not None
     given = {one: unit for one, unit in {_CLOCK: time, "dt": time, "spike": NUMBER}.items() if one not in declared}
     # what is declared in a unit that is not ours has some unit: formulas give it none
-    labels = {one: unit.to_formulas for one, text in sheet.written.items() if (unit := unit_of(text)) is not None}
-    known = {**given, **ends, **labels}
+    known = {**given, **ends, **as_known(sheet.written)}
     equations = tuple(_equations(kind, parts, time))
     read = frozenset().union(*(names(one.tree) for one in equations), (one.name for one in equations if one.name))
     free = read - sheet.written.keys() - _NUMBERS - known.keys()
     while more := _deduced(equations, known, free):
         known |= more
     reads = tuple(sorted(read - declared - given.keys() - _NUMBERS))
-    return sheet._replace(known=known, reads=reads, faults=tuple(_faults(equations, known)))
+    return sheet._replace(known=known, reads=reads, faults=tuple(faults_of(equations, known)))
+
+
+def as_known(written: Mapping[str, str]) -> dict[str, Unit]:
+    """The units of names as formulas take them, where they are made of ours."""
+    return {name: unit.to_formulas for name, text in written.items() if (unit := unit_of(text)) is not None}
 
 
 def _deduced(equations: Iterable[Equation], known: Mapping[str, Unit], free: frozenset[str]) -> dict[str, Unit]:
@@ -133,8 +138,8 @@ def _wanted(equation: Equation, known: Mapping[str, Unit]) -> Unit | None:
     return None if unit is None else unit * equation.per
 
 
-def _faults(equations: Iterable[Equation], known: Mapping[str, Unit]) -> Iterator[Fault]:
-    """What does not fit."""
+def faults_of(equations: Iterable[Equation], known: Mapping[str, Unit]) -> Iterator[Fault]:
+    """What does not fit in equations."""
     for one in equations:
         wanted = _wanted(one, known)
         made = read_units(one.tree, known, wanted=wanted)
