@@ -163,3 +163,44 @@ def test_the_command_prints_how_groups_fire(tmp_path: Path) -> None:
     assert re.search(r"^ +neurons +spikes +rate \(1/s\) +interval \(s\) +CV +Fano factor$", said, re.MULTILINE)
     groups = analysis.group_firing(RUN)
     assert re.search(rf"^  K +2 +{groups['K', 'spikes']:g} +{groups['K', 'rate']:.4g} ", said, re.MULTILINE)
+
+
+RATED = """\
+neurovis: 1
+name: rated
+time: {dt: 1 ms, steps: 200}
+models:
+  cell: {time: ms, state: {v: {derivative: (drive - v)/20}}, spike: {when: v >= 1, set: {v: 0}}}
+  shown: {time: ms, state: {v: {derivative: (drive - v)/10}}, spike: {when: v >= 1, set: {v: 0}}, activity: v}
+neurons: {K: {count: 2, model: cell, bias: [1.3, 1.6]}, P: {count: 2, model: shown, bias: [1.4, 0]}}
+"""
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy"])
+def test_a_measure_of_the_rate(backend: str) -> None:
+    """Of groups, of neurons whose activity is something else, step by step, in blocks, and of a recording."""
+    network = nv.compile_text(RATED)
+    run = network.run(backend=backend, states=["P.spike"])
+    for name, fired in (("K", run["K"]), ("K2", run["K2"][:, None]), ("P", run["P.spike"])):
+        wanted = [fired[max(step - 49, 0) : step + 1].sum() / (50 * fired.shape[1] * 0.001) for step in range(200)]
+        np.testing.assert_allclose(network.measure(f"rate({name}, last=50)", run)[49:], wanted[49:])
+        reached = int(np.flatnonzero(np.array(wanted[49:]) > 0.9 * max(wanted))[0]) + 49
+        ended = network.run(backend=backend, until=f"rate({name}, last=50) > {0.9 * max(wanted)}")
+        assert ended.step[-1] == reached
+    plain = network.run(backend=backend)
+    np.testing.assert_array_equal(network.measure("rate(P)", plain), network.measure("rate(P)", run))
+
+
+@pytest.mark.parametrize(
+    ("measure", "message"),
+    [
+        ("rate(O, last=5) > 1", "'O' does not spike"),
+        ("rate(2*K1, last=5) > 1", "'rate' is of neurons that spike"),
+        ("rate(J, last=5) > 1", "no neuron, group or output 'J'"),
+        ("rate(K) > 1", "'rate' here needs the number of steps"),
+        ("rate(K, last=900) > 1", "the last 900 steps of a run of 200"),
+    ],
+)
+def test_a_rate_that_cannot_be(measure: str, message: str) -> None:
+    with pytest.raises(nv.SpecError, match=message):
+        NETWORK.run(until=measure)

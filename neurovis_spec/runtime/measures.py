@@ -16,18 +16,19 @@ from typing import Final
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import SPIKE
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate, evaluate_array
 from neurovis_spec.language.expressions.functions import rows_of
-from neurovis_spec.language.expressions.measures import PLACE, Formula, parse_measure
+from neurovis_spec.language.expressions.measures import PLACE, SPIKES, Formula, parse_measure
 from neurovis_spec.language.expressions.parser import ExpressionError
 from neurovis_spec.language.expressions.tree import Name, Tree, is_square, names, walk
 from neurovis_spec.language.references import Arrow, parse_sum, state_of
 from neurovis_spec.likeness import suggest
-from neurovis_spec.runtime.columns import Probe, probe_of
+from neurovis_spec.runtime.columns import Probe, probe_of, spiking_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.errors import RecordingError, UnknownNameError
 from neurovis_spec.runtime.names import Names, names_of
@@ -53,6 +54,9 @@ class Measure:
     slots: Mapping[str, int]
     #: for each state its column among those that ``probe`` reads
     states: Mapping[str, int]
+    #: for each reference whose rate is asked for the neurons that it names whose activity is a spike, and the states
+    #: that are the spikes of the others
+    spikes: Mapping[str, tuple[IntArray, tuple[str, ...]]]
     probe: Probe
     #: seconds a step
     dt: float
@@ -113,8 +117,8 @@ def parsed(text: str, label: str, *, bounded: bool = False) -> Formula:
             findings.error(one.code, _span(label, one.start, one.end), one.message, one.hint)
     for window in () if formula is None or not bounded else formula.windows:
         if window.last is None:
-            message = f"'{window.summary}' here needs the number of steps that it is of"
-            hint = f"write '{window.summary}(…, last=100)' for the last hundred"
+            message = f"'{window.called}' here needs the number of steps that it is of"
+            hint = f"write '{window.called}(…, last=100)' for the last hundred"
             findings.error("bad-window", _span(label, window.start, window.end), message, hint)
     findings.check()
     assert formula is not None
@@ -127,14 +131,17 @@ def resolved(formula: Formula, network: Network, label: str) -> Measure:
     neurons: dict[str, int] = {}
     slots: dict[str, int] = {}
     states: dict[str, StateOf] = {}
+    spikes: dict[str, tuple[IntArray, tuple[str, ...]]] = {}
     places = {PLACE(number) for number in range(len(formula.windows))}
     for node in _named(formula):
         span = _span(label, node.start, node.end)
-        if node.name not in places and not _resolve_state(node.name, span, network, directory, states, findings):
+        if node.name.startswith(SPIKES):
+            _resolve_spikes(node.name, span, network, directory, spikes, states, findings)
+        elif node.name not in places and not _resolve_state(node.name, span, network, directory, states, findings):
             _resolve(node.name, span, network, directory, neurons, slots, findings)
     findings.check()
     columns = {name: column for column, name in enumerate(states)}
-    return Measure(formula, neurons, slots, columns, probe_of(network, states.values()), network.dt, label)
+    return Measure(formula, neurons, slots, columns, spikes, probe_of(network, states.values()), network.dt, label)
 
 
 def measure_of(text: str, network: Network, label: str, *, bounded: bool = False) -> Measure:
@@ -175,6 +182,34 @@ def _resolve_state(
         message = f"'{shorten(name)}' is {sum(state.size for state in named)} states, and no single one"
         findings.error("not-one-number", span, message, f"name one of them, as in '{one}'")
     return True
+
+
+def _resolve_spikes(
+    name: str,
+    span: Span,
+    network: Network,
+    directory: Names,
+    spikes: dict[str, tuple[IntArray, tuple[str, ...]]],
+    states: dict[str, StateOf],
+    findings: Findings,
+) -> None:
+    """Whose spikes a rate is of: put into ``spikes``, and into ``states`` what tells them, or reported."""
+    reference = name.removeprefix(SPIKES)
+    found = directory.find(reference)
+    if isinstance(found, str):
+        findings.error("unknown-name", span, found)
+        return
+    neurons, spiking = np.array(found.neurons, dtype=np.int64), spiking_of(network)
+    silent = np.setdiff1d(neurons, spiking.neurons)
+    if len(silent):
+        message = f"'{network.neurons.names[int(silent[0])]}' does not spike, as its model says"
+        findings.error("not-one-number", span, message, "a rate is of neurons that spike; of others write mean(…)")
+        return
+    others = np.intersect1d(neurons, spiking.by_state)
+    own = [StateOf.of("neuron", SPIKE, others[at : at + 1]) for at in range(len(others))]
+    names = network.state_names(own)
+    states |= dict(zip(names, own, strict=True))
+    spikes[name] = np.intersect1d(neurons, spiking.by_activity), tuple(names)
 
 
 def _resolve(
@@ -247,6 +282,8 @@ class Meter:
             known[name] = float(parameters[slot])
         for name, column in self.measure.states.items():
             known[name] = float(states[column])
+        for name in self.measure.spikes:
+            known[name] = float(self._rate(name, activity[None], states[None])[0])
         k = self.first + self.made
         known["k"] = float(k)
         known["t"] = k * self.measure.dt
@@ -256,6 +293,14 @@ class Meter:
             self.values[number] = known[PLACE(number)] = value
         return math.nan if self.made < self.measure.longest else evaluate(self.measure.formula.tree, known)
 
+    def _rate(self, name: str, activity: FloatArray, states: FloatArray) -> FloatArray:
+        """How many of the neurons of a reference fire at each of some steps, a neuron and a second, (steps,)."""
+        neurons, of_states = self.measure.spikes[name]
+        columns = [self.measure.states[state] for state in of_states]
+        fired = np.count_nonzero(activity[:, neurons], axis=1) + np.count_nonzero(states[:, columns], axis=1)
+        result: FloatArray = fired / ((len(neurons) + len(columns)) * self.measure.dt)
+        return result
+
     def rows(self, activity: FloatArray, parameters: FloatArray, states: FloatArray) -> FloatArray:
         """After each of some more steps, all with the same parameters: a row of ``activity`` and ``states`` a step."""
         count = len(activity)
@@ -263,6 +308,7 @@ class Meter:
         known |= {name: activity[:, index] for name, index in self.measure.neurons.items()}
         known |= {name: float(parameters[slot]) for name, slot in self.measure.slots.items()}
         known |= {name: states[:, column] for name, column in self.measure.states.items()}
+        known |= {name: self._rate(name, activity, states) for name in self.measure.spikes}
         begin = self.first + self.made
         k = np.arange(begin, begin + count).astype(np.float64)
         known |= {"k": k, "t": k * self.measure.dt}
@@ -310,8 +356,16 @@ def over(text: str, network: Network, recording: Recording) -> FloatArray:
 
 
 def _states(names: Sequence[str], recording: Recording) -> FloatArray:
-    """The columns of these states."""
+    """The columns of these states, of spikes as a recording has them beside."""
+    index, found = {name: place for place, name in enumerate(recording.neurons)}, list[FloatArray]()
+    spiking = set() if recording.spiking is None else set(recording.spiking.tolist())
     for name in names:
-        if name not in recording.state_names:
+        neuron = index.get(name.removesuffix(f".{SPIKE}"))
+        if name in recording.state_names:
+            found.append(recording.states[:, recording.state_names.index(name)])
+        elif name.endswith(f".{SPIKE}") and neuron in spiking:
+            fired = recording.spike_steps[recording.spike_neurons == neuron]
+            found.append(np.isin(recording.step, fired).astype(np.float64))
+        else:
             raise RecordingError(f"the state '{name}' was not recorded")
-    return recording.states[:, [recording.state_names.index(name) for name in names]]
+    return np.stack(found, axis=1) if found else np.zeros((len(recording), 0))

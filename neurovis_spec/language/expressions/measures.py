@@ -1,8 +1,8 @@
 """Measures: expressions of a run, such as ``rms(O - T, last=129) < 0.01``.
 
 In: the text of an expression whose names may be references to neurons and outputs (``left1.K3``), with ``rms``,
-``mean``, ``min`` and ``max`` over the last N steps. Out: a Formula: the windows, and a tree in which each of them is a
-name; or an ExpressionError. Names are not looked up here.
+``mean``, ``min``, ``max`` and ``rate`` over the last N steps. Out: a Formula: the windows, and a tree in which each of
+them is a name; or an ExpressionError. Names are not looked up here.
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ Summary: TypeAlias = Literal["rms", "mean", "min", "max"]
 SUMMARIES: Final[tuple[Summary, ...]] = get_args(Summary)
 #: The name that stands for window i in the tree of a Formula; no author can write it.
 PLACE: Final[Callable[[int], str]] = "window {}".format
+#: What the name of neurons has before it where their spikes are meant.
+SPIKES: Final = "spikes of "
+RATE: Final = "rate"
 
 _HOW: Final = "write '{0}(x, last=N)', of the last N steps, or '{0}(x)', of the whole run"
 
@@ -38,6 +41,11 @@ class Window:
     last: int | None
     start: int
     end: int
+
+    @property
+    def called(self) -> str:
+        """As it is written: a rate is the mean of how many fire a second."""
+        return RATE if isinstance(self.tree, Name) and self.tree.name.startswith(SPIKES) else self.summary
 
 
 @dataclass(frozen=True)
@@ -70,13 +78,13 @@ class _Parser(Parser):
     """The parser of expressions, with windows."""
 
     def __init__(self, text: str) -> None:
-        super().__init__(text, False, {"rms": 1, "mean": 1}, "references")
+        super().__init__(text, False, {"rms": 1, "mean": 1, RATE: 1}, "references")
         self.windows: list[Window] = []
         self._within: Token | None = None
 
     def call(self, name: Token) -> Tree:
         commas, sign = self._inside()
-        if name.text in ("rms", "mean") or (name.text in SUMMARIES and (sign is not None or not commas)):
+        if name.text in ("rms", "mean", RATE) or (name.text in SUMMARIES and (sign is not None or not commas)):
             return self._window(name)
         if sign is not None and self.arity(name.text) is not None:
             message, hint = f"the arguments of '{name.text}' have no names", "write the values alone"
@@ -125,8 +133,18 @@ class _Parser(Parser):
             given = "nothing" if not values else f"{len(values)} values"
             message = f"'{name.text}' over steps is of one value, here of {given}"
             raise ExpressionError("bad-window", message, name.start, end, _HOW.format(name.text))
-        self.windows.append(Window(cast(Summary, name.text), values[0], last, name.start, end))
+        summary = name.text
+        if summary == RATE:
+            summary, values = "mean", [self._spikes(name, values[0], end)]
+        self.windows.append(Window(cast(Summary, summary), values[0], last, name.start, end))
         return Name(PLACE(len(self.windows) - 1), name.start, end)
+
+    def _spikes(self, name: Token, value: Tree, end: int) -> Tree:
+        """What a rate is of, the neurons of a reference."""
+        if isinstance(value, Name):
+            return Name(SPIKES + value.name, value.start, value.end)
+        message, hint = "'rate' is of neurons that spike", "write 'rate(E, last=N)', with a neuron or a group"
+        raise ExpressionError("bad-window", message, name.start, end, hint)
 
     def _last(self, name: Token, before: int | None) -> int:
         """``last=N``."""
