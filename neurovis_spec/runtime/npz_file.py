@@ -385,7 +385,6 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
     if not (math.isfinite(dt) and dt > 0):
         raise RecordingError(f"'dt' is {dt}")
     about = _about(arrays)
-    spiking = _integers(arrays, "spiking", 0, n, ascending=True) if "spiking" in arrays else None
     step = _integers(arrays, "step", 0, 2**62, ascending=True)
     weights = arrays["weights"].astype(np.float64)
     after = _after(arrays, about, after_rows(step, weights, p), n, m)
@@ -420,17 +419,20 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         skeleton=skeleton,
         backend=str(about.get("backend", "")),
     )
-    return recording if spiking is None else recording.with_fired(_fired(arrays, spiking), spiking)
+    return _with_spikes(recording, arrays)
 
 
-def _fired(arrays: Mapping[str, Array], spiking: IntArray) -> Fired:
-    """The spikes of the neurons that do. Raises RecordingError."""
+def _with_spikes(recording: Recording, arrays: Mapping[str, Array]) -> Recording:
+    """A recording with the spikes that the arrays hold, if they hold any. Raises RecordingError."""
+    if "spiking" not in arrays:
+        return recording
+    spiking = _integers(arrays, "spiking", 0, len(recording.neurons), ascending=True)
     missing = [name for name in ("spike_steps", "spike_neurons", "spike_range") if name not in arrays]
     if missing or len(arrays["spike_range"]) != 2:
         raise RecordingError("it says who spikes, and not when")
     steps, neurons = (arrays[name].astype(np.int64) for name in ("spike_steps", "spike_neurons"))
     first, stop = arrays["spike_range"].astype(np.int64).tolist()
-    return _checked(Fired(steps, neurons, first, stop), spiking)
+    return recording.with_fired(_checked(Fired(steps, neurons, first, stop), spiking), spiking)
 
 
 def _checked_skeleton(arrays: Mapping[str, Array], rows: int) -> Skeleton | None:

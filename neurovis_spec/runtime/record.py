@@ -211,15 +211,10 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     forming = Forming(network, backend.functions) if columns.probe.forms else None
     make: _Make = _OneByOne(hands, columns, stepper, body, frozenset(course.inputs or ()), forming)
     pace = _Pace(STRETCH, STRETCH)
-    # a runner gives the activities of all neurons and all changing weights, states and signals of synapses only where
-    # it is a probing one
-    plain = columns.neurons is None and len(columns.weights) == len(network.changing)
     spiking = columns.spiking if columns.spiking and rows.fired is not None else None
-    if columns.probe.names or (spiking is not None and len(spiking.by_state)):
-        plain = plain and isinstance(stepper, Probing)
     if (
         isinstance(stepper, Runner)
-        and plain
+        and _given_together(stepper, columns, network, spiking)
         and body is None
         and (course.until is None or course.until.measure.together)
     ):
@@ -245,6 +240,14 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
                 if progress is not None:
                     progress(stop - origin, steps)
                 first = stop
+
+
+def _given_together(stepper: Stepper, columns: Columns, network: Network, spiking: Spiking | None) -> bool:
+    """Whether a runner gives what is recorded: the activities of all neurons and all changing weights; states, spikes
+    that are one, and signals of synapses only where it is a probing one."""
+    plain = columns.neurons is None and len(columns.weights) == len(network.changing)
+    probed = len(columns.probe.names) > 0 or (spiking is not None and len(spiking.by_state) > 0)
+    return plain and (isinstance(stepper, Probing) or not probed)
 
 
 class _Hands(NamedTuple):
