@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from small_specs import codes, compiled
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, SYNAPSE
 from neurovis_spec.compiler.values.builtin import builtin_definitions
+from neurovis_spec.compiler.values.definitions import Default
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.manual.builtins import Builtin, builtins
@@ -105,21 +107,60 @@ DEFAULTS = {
         "threshold": -50, "top": 0,
     },
     "ltc": {"C": 1, "g": 1, "E": 0},
+    "lif": {"tau": 20, "rest": -70, "threshold": -50, "reset": -60, "refractory": 2},
+    "lif_current": {
+        "tau": 10, "C": 250, "rest": -65, "threshold": -50, "reset": -65, "refractory": 2, "tau_excitatory": 0.5,
+        "tau_inhibitory": 0.5,
+    },
+    "lif_conductance": {
+        "tau": 20, "rest": -60, "threshold": -50, "reset": -60, "refractory": 5, "tau_excitatory": 5,
+        "tau_inhibitory": 10, "Ee": 0, "Ei": -80,
+    },
+    "lif_conductance_alpha": {
+        "C": 250, "g": 16.6667, "rest": -70, "threshold": -55, "reset": -60, "refractory": 2, "tau_excitatory": 0.2,
+        "tau_inhibitory": 2, "Ee": 0, "Ei": -85,
+    },
+    "adex": {
+        "C": 281, "gL": 30, "EL": -70.6, "VT": -50.4, "DT": 2, "tau_w": 144, "a": 4, "b": 80.5, "Vr": -70.6,
+        "Vpeak": -40.4, "tau_excitatory": 5, "tau_inhibitory": 10, "Ee": 0, "Ei": -80,
+    },
+    "izhikevich_ode": {"a": 0.02, "b": 0.2, "c": -65, "d": 8}, "qif": {"tau": 10, "peak": 100}, "spike_source": {},
     "delta": {"rate": 0.01}, "hebbian": {"rate": 0.01}, "anti_hebbian": {"rate": 0.01}, "oja": {"rate": 0.01},
     "bcm": {"rate": 0.01, "threshold_rate": 0.01}, "covariance": {"rate": 0.01, "average_rate": 0.01},
     "input_correlation": {"rate": 0.01}, "differential_hebbian": {"rate": 0.01},
     "reward_modulated": {"rate": 0.01, "smoothing": 0.9}, "policy_gradient": {"rate": 0.01, "smoothing": 0.9},
-    "decay": {"rate": 0.01},
+    "decay": {"rate": 0.01}, "stdp": {"tau_pre": 20, "tau_post": 20, "up": 0.01, "down": 0.0105},
+    "stdp_multiplicative": {"tau_pre": 20, "tau_post": 20, "up": 0.01, "down": 0.0105, "highest": 1},
+    "stdp_triplet": {
+        "tau_plus": 16.8, "tau_x": 101, "tau_minus": 33.7, "tau_y": 125, "A2_plus": 5e-10, "A3_plus": 6.2e-3,
+        "A2_minus": 7e-3, "A3_minus": 2.3e-4,
+    },
+    "stdp_reward": {"rate": 0.01, "tau_pre": 20, "tau_post": 20, "tau_eligibility": 1000, "up": 1, "down": 1.05},
+    "homeostatic_scaling": {"rate": 1e-5, "goal": 5, "tau": 1000},
+    "vogels_inhibitory": {"rate": 0.001, "tau": 20, "goal": 5},
 }  # fmt: skip
 SYNAPSES = {
     "gap_junction": {}, "diffusive": {}, "graded": {"E": 0, "rest": -40},
     "phase": {"lag": 0}, "amplitude_phase": {"lag": 0},
     "sigmoidal_conductance": {"E": 0, "threshold": -44, "slope": 2, "rest": -40},
+    "exponential": {"tau": 5, "E": 0, "rest": -60}, "alpha": {"tau": 5, "E": 0, "rest": -60},
+    "double_exponential": {"tau_rise": 1, "tau_decay": 5, "E": 0, "rest": -60},
+    "nmda": {"tau_rise": 2, "tau_decay": 100, "alpha": 0.5, "Mg": 1, "E": 0},
+    "tsodyks_markram": {"U": 0.5, "tau_rec": 800, "tau_fac": 1000},
 }  # fmt: skip
 SIGNALS = {
     "delta": ("target",), "input_correlation": ("reflex",),
-    "reward_modulated": ("policy", "reward"), "policy_gradient": ("noise", "reward"),
+    "reward_modulated": ("policy", "reward"), "policy_gradient": ("noise", "reward"), "stdp_reward": ("reward",),
 }  # fmt: skip
+
+
+def settled(defaults: Iterable[Default]) -> dict[str, float]:
+    """Those of a definition, which may follow from ones before."""
+    found: dict[str, float] = {}
+    for default in defaults:
+        if default.value is not UNKNOWN:
+            found[default.name] = evaluate(default.value, found)
+    return found
 
 
 def test_the_built_in_ones_are_those_of_the_tables_with_their_parameters_and_signals() -> None:
@@ -127,10 +168,7 @@ def test_the_built_in_ones_are_those_of_the_tables_with_their_parameters_and_sig
     known = builtin_definitions()
     found: dict[str, dict[str, dict[str, float]]] = {}
     for kind in (ACTIVATION, MODEL, RULE, SYNAPSE):
-        found[kind.name] = {
-            name: {default.name: evaluate(default.value, {}) for default in defaults if default.value is not UNKNOWN}
-            for name, (_, defaults) in known.of(kind).known().items()
-        }
+        found[kind.name] = {name: settled(defaults) for name, (_, defaults) in known.of(kind).known().items()}
     assert {**found["activation"], **found["model"], **found["rule"]} == DEFAULTS
     assert found["synapse"] == SYNAPSES
     assert {name: rule.signals for name, (rule, _) in known.of(RULE).known().items() if rule.signals} == SIGNALS

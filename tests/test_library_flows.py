@@ -293,7 +293,7 @@ connections: {N -> N: {weight: 0.3, pattern: all_to_all, port: inhibitory}}"""
 
 def test_each_names_its_source_and_what_its_parameters_are() -> None:
     models = [one for one in builtins() if one.kind == "model" and (one.time or one.name == "cfc")]
-    assert len(models) == 16
+    assert len(models) == 23
     for one in models:
         assert any(
             f" {year} " in one.about or f"{year})" in one.about or f" {year}," in one.about
@@ -306,5 +306,6 @@ def test_each_names_its_source_and_what_its_parameters_are() -> None:
 def test_a_model_of_ones_own_with_such_a_name_is_no_finding() -> None:
     text = "neurovis: 1\nname: x\nmodels: {{{0}: {{activity: f(drive)}}}}\nneurons: {{A: {{model: {0}, bias: 1}}}}"
     assert all(nv.compile_text(text.format(name)).warnings == () for name in LATER[MODEL])
-    assert LATER[MODEL] == {one.name for one in builtins() if one.kind == "model" and (one.time or one.name == "cfc")}
+    timed = {one.name for one in builtins() if one.kind == "model" and one.time}
+    assert LATER[MODEL] == {*timed, "cfc", "spike_source"}
     assert [one.code for one in nv.compile_text(text.format("adaptive")).warnings] == ["replaces-builtin"]

@@ -80,6 +80,7 @@ def test_each_names_its_source_and_what_its_parameters_are() -> None:
     synapses = [one for one in builtins() if one.kind == "synapse"]
     assert {one.name for one in synapses} == {
         "gap_junction", "diffusive", "graded", "sigmoidal_conductance", "phase", "amplitude_phase",
+        "exponential", "alpha", "double_exponential", "nmda", "tsodyks_markram",  # in test_library_spikes
     }  # fmt: skip
     assert all(about for one in synapses for _, _, about in one.parameters)
 

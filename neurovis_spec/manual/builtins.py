@@ -9,16 +9,19 @@ import re
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Literal, TypeAlias, get_args
+from typing import Final, Literal, TypeAlias, get_args
 
 from neurovis_spec import plugins
-from neurovis_spec.compiler.program import DRIVE, MODEL, SYNAPSE
+from neurovis_spec.compiler.program import AT_SPIKE, DRIVE, MODEL, RULE, SPIKE, SYNAPSE
+from neurovis_spec.compiler.program import Kind as DefinitionKind
 from neurovis_spec.compiler.values.builtin import builtin_definitions, libraries
+from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, SynapseModel, TimedModel
 from neurovis_spec.language.values import ParameterModel
 from neurovis_spec.language.yaml.source import Entry, Mapping
 
 Kind: TypeAlias = Literal["activation", "model", "rule", "synapse"]
+_NUMBER: Final = re.compile(r"[-+.\de]+")
 _Definition: TypeAlias = ActivationModel | ModelModel | RuleModel | SynapseModel
 
 
@@ -41,27 +44,36 @@ class Builtin:
 
     @property
     def use(self) -> str:
-        """How it is written where it is used, with all that may be set."""
-        settings = [f"{name}: {default}" for name, default, _ in self.parameters]
+        """How it is written where it is used, with all that may be set; what follows from other parameters of its own
+        (``VT + 5*DT``) is left to do so."""
+        settings = [f"{name}: {default}" for name, default, _ in self.parameters if _NUMBER.fullmatch(default)]
         settings += [f"{signal}: T" for signal in self.signals]
         choice = f"{{{self.name}: {{{', '.join(settings)}}}}}" if settings else self.name
         time = f"time: {{{self.time}}}\n" if self.time else ""
         if self.kind in ("rule", "synapse"):
-            key, neurons = ("plasticity", "") if self.kind == "rule" else ("synapse", _joined(self.name))
-            return f"{time}{neurons}connections: {{K -> O: {{weight: 0.1, {key}: {choice}}}}}"
+            key = "plasticity" if self.kind == "rule" else "synapse"
+            neurons, port = _joined(RULE if self.kind == "rule" else SYNAPSE, self.name)
+            time = time or ("time: {dt: 0.001}\n" if neurons else "")
+            return f"{time}{neurons}connections: {{K -> O: {{weight: 0.1, {port}{key}: {choice}}}}}"
         return f"{time}neurons: {{K: {{{self.kind}: {choice}}}}}"
 
 
-def _joined(synapse: str) -> str:
-    """The neurons that a synapse joins where it is shown in use, if it reads more of them than what they send: of the
-    first model that flows and has all of that."""
+def _joined(kind: DefinitionKind, name: str) -> tuple[str, str]:
+    """The neurons that a rule or a synapse joins where it is shown in use, if it reads more of them than what they send
+    (of the first model that flows and has all of that, and fires where it waits for spikes), and their port for what
+    only a spike brings."""
     known = builtin_definitions()
-    needed = {end.name for end in known.of(SYNAPSE).known()[synapse].definition.end_names}
-    for name, (model, _) in known.of(MODEL).known().items() if needed else ():
+    definition = known.of(kind).known()[name].definition
+    needed = {end.name for end in definition.end_names}
+    waits, signal = SPIKE in needed, definition.given.each_step
+    for other, (model, _) in known.of(MODEL).known().items() if needed else ():
         there = {MODEL.gives, *model.parameters, *(one.name for one in model.kept)}
-        if model.flows and needed <= there:
-            return f"time: {{dt: 0.001}}\nneurons: {{K: {{model: {name}}}, O: {{model: {name}}}}}\n"
-    return ""
+        if model.flows and needed <= there and (model.spikes or not waits):
+            brings = waits and (kind == RULE or signal is None or AT_SPIKE["on_pre"] in names(signal))
+            port = f"port: {model.ports[0].name}, " if brings else ""
+            told = ", T: {}" if definition.signals else ""
+            return f"neurons: {{K: {{model: {other}}}, O: {{model: {other}}}{told}}}\n", port
+    return "", ""
 
 
 @cache

@@ -142,7 +142,11 @@ LATER: Final[Mapping[Kind, frozenset[str]]] = {
     MODEL: frozenset({
         "leaky", "fitzhugh_nagumo", "matsuoka", "hopf", "van_der_pol", "wilson_cowan", "jansen_rit", "phase_oscillator",
         "amplitude_oscillator", "ornstein_uhlenbeck", "cfc", "hodgkin_huxley", "morris_lecar", "graded", "danner",
-        "ltc",
+        "ltc", "lif", "lif_current", "lif_conductance", "lif_conductance_alpha", "adex", "izhikevich_ode", "qif",
+        "spike_source",
+    }),
+    RULE: frozenset({
+        "stdp", "stdp_multiplicative", "stdp_triplet", "stdp_reward", "homeostatic_scaling", "vogels_inhibitory",
     }),
 }  # fmt: skip
 _READINGS = (
