@@ -14,6 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import neurovis_spec as nv
+from neurovis_spec.analysis import group_firing
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.live.commands import Pause, Play, Seek, Step
@@ -29,8 +30,10 @@ from neurovis_spec.ros.logs import Stored
 from neurovis_spec.ros.middleware import Arrival
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, label_of, text_message
+from neurovis_spec.scene.fading import snapshots_of
 
 SPEC = """
 neurovis: 1
@@ -397,3 +400,36 @@ def test_the_last_steps_are_recalled_and_it_goes_on_with_the_newest(source: Rece
     assert [one.snapshot.step for one in source.recall(100)] == [0, 1, 2, 5, 6, 7, 8]
     source.go(5)
     assert [one.snapshot.step for one in source.recall(2)] == [2, 5]
+
+
+def test_spikes_come_as_activities_fade_and_are_measured(tmp_path: Path) -> None:
+    """Of a network that spikes topics carry activities as ever; a picture and a measure know which are spikes."""
+    spiking = nv.compile_text("""neurovis: 1
+name: x
+time: {dt: 1 ms, steps: 120}
+models: {cell: {time: ms, state: {v: {derivative: (drive - v)/20}}, spike: {when: v >= 1, set: {v: 0}}}}
+neurons: {K: {count: 2, model: cell, bias: [1.3, 1.7]}, O: {}}
+connections: {K -> O: {weight: 1}}
+""")
+    made, path = spiking.run(), tmp_path / "x.mcap"
+    source = ReceivedSource(spiking.network)
+    listening = Listening(spiking, 2, Wanted(path), print)
+    listening.start()
+    for step in made.step.tolist():
+        data = ArrayForm.of(label_of(made.hash), 3, "cdr").message(step, step / 1000, made.activity[step])
+        listening.put("/neurovis/x/activity", Arrival(data, step * 10**6, None, ARRAY))
+        source.hear_activity(step, step * 10**6, made.activity[step])
+    until(lambda: listening.counts["activity"].recorded == 120)
+    listening.end()
+    source.advance()
+    (wanted,) = snapshots_of(spiking.network, made, [119])
+    seen = source.seen().snapshot.seen
+    assert seen is not None
+    assert seen.tolist() == pytest.approx(np.asarray(wanted.seen).tolist(), abs=2e-5)
+    assert 0 < seen[0] < 1
+    read = nv.load(path)
+    with pytest.raises(RecordingError, match="holds no spikes"):
+        read.spikes("K")
+    known = fitted(read, spiking.network)
+    np.testing.assert_array_equal(known.spikes("K").times, made.spikes("K").times)
+    np.testing.assert_array_equal(group_firing(known), group_firing(made))
