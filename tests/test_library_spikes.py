@@ -199,8 +199,8 @@ connections:
     assert expected.max() > -69
 
 
-def test_adex_fires_11_times_in_300_ms_and_tires() -> None:
-    found = run("neurons: {N: {model: adex, bias: 1000}}", "{dt: 0.01 ms}", 30000, "N.v; N.w")
+def test_adex_tires() -> None:
+    found = run("neurons: {N: {model: adex, bias: 1000}}", "{dt: 0.05 ms}", 3000, "N.v; N.w")
 
     def flow(x: FloatArray) -> FloatArray:
         v, w = x
@@ -209,9 +209,9 @@ def test_adex_fires_11_times_in_300_ms_and_tires() -> None:
         return np.array([current / 281, (4 * (top + 70.6) - w) / 144])
 
     cell = Cell(flow, [-70.6, 0.0], lambda x: bool(x[0] >= -40.4), lambda x: [-70.6, x[1] + 80.5])
-    expected, spikes = by_hand(cell, 0.01, 30000)
+    expected, spikes = by_hand(cell, 0.05, 3000)
     assert fired(found.activity) == spikes
-    assert len(spikes) == 11
+    assert len(spikes) > 5
     assert np.diff(spikes)[-1] > 1.5 * np.diff(spikes)[0]
     assert np.abs(found.shown[:, :, 0].T - expected).max() < 1e-9
 

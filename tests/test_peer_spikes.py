@@ -1,0 +1,74 @@
+"""Networks that spike against Brian2, whose spikes and weights are in ``data/spikes.npz``; ``make_spikes`` makes them,
+on the same connections and from the same initial values."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from make_spikes import ADEX, BRUNEL, COBA, FILE, POST, PRE, STEPS, of_steps
+
+import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.runtime.recording import Recording
+
+EXPECTED = np.load(FILE)
+
+
+def fired(run: Recording) -> FloatArray:
+    """(spikes, 2) steps and neurons, by steps."""
+    return np.argwhere(run.activity != 0).astype(np.float64)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("brunel", BRUNEL), ("coba_1", COBA.replace("DELAY", "1")), ("coba_0", COBA.replace("DELAY", "0"))],
+)
+def test_every_spike_of_a_network(name: str, text: str) -> None:
+    found = fired(nv.compile_text(text).run(3001, backend="numpy"))
+    expected = EXPECTED[name]
+    assert len(expected) > 2000
+    assert found.shape == expected.shape
+    assert (found == expected).all()
+
+
+def test_adex_is_brian2s() -> None:
+    run = nv.compile_text(ADEX).run(30001, backend="numpy", states=["N.v", "N.w"])
+    assert np.flatnonzero(run["N"]).tolist() == EXPECTED["adex"].tolist()
+    assert len(EXPECTED["adex"]) == 11
+    found = np.stack([run[name][:-1:100].ravel() for name in ("N.v", "N.w")])
+    assert np.abs(found - EXPECTED["adex_states"]).max() < 4.6e-13
+
+
+def joined(body: str, target: str) -> str:
+    """Three sources, each joined to a target."""
+    return f"""neurovis: 1
+name: pairs
+time: {{dt: 1 ms, integrate: exponential}}
+models:
+  told:
+    ports: [aside]
+    state: {{waiting: {{each_step: drive}}, total: {{jump: aside}}}}
+    spike: {{when: waiting >= 1, set: {{waiting: 0}}}}
+inputs:
+  pre: {{spikes: {{times: {of_steps(PRE)}}}}}
+  post: {{spikes: {{times: {of_steps(POST)}}}}}
+neurons:
+  A: {{count: 3, model: spike_source, input: pre}}
+  B: {{count: 3, model: told{target}}}
+connections: {{A -> B: {{pattern: one_to_one, port: aside, {body}}}}}
+"""
+
+
+@pytest.mark.parametrize(("rule", "bound"), [("stdp", 2.8e-16), ("stdp_triplet", 1.4e-14)])
+def test_weights_learnt_by_timing(rule: str, bound: float) -> None:
+    text = joined(f"weight: 0.5, plasticity: {rule}", ", input: post")
+    found = nv.compile_text(text).run(STEPS + 2, backend="numpy").weights[1:]
+    assert np.abs(found - EXPECTED[rule]).max() <= bound
+    assert np.ptp(found) > 0.01
+
+
+def test_what_tsodyks_and_markrams_synapses_release() -> None:
+    text = joined("weight: 2, delay: 3, synapse: tsodyks_markram", "")
+    found = nv.compile_text(text).run(STEPS + 1, backend="numpy", states=["B.total"])["B.total"]
+    assert np.abs(found - EXPECTED["tsodyks_markram"]).max() < 8e-14
+    assert found[-1].min() > 1
