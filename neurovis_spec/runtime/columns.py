@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray, subscript
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Located, Network
@@ -139,9 +139,15 @@ class Spiking:
         """All that do, ascending."""
         return np.union1d(self.by_activity, self.by_state)
 
+    @cached_property
+    def activities(self) -> slice | IntArray:
+        """Where those of ``by_activity`` stand among all activities."""
+        found = subscript(self.by_activity)
+        return slice(0) if found is None else found
+
     def now(self, state: State) -> IntArray:
         """Those that have fired in the last step, ascending."""
-        fired = self.by_activity[_fire(state.activity[self.by_activity])]
+        fired = self.by_activity[_fire(state.activity[self.activities])]
         if not len(self.by_state):
             return fired
         active = (self.probe.now(state) != 0) & ~state.conditions.lesioned_neurons[self.by_state]
@@ -150,9 +156,9 @@ class Spiking:
     def of_rows(self, first: int, activity: FloatArray, spikes: FloatArray, lesioned: npt.NDArray[np.bool_]) -> Fired:
         """Those that have fired in some steps from ``first`` on: by the activities (steps, len(by_activity)), by
         what the probe reads (steps, len(by_state)), but for neurons that were ``lesioned`` (n,) meanwhile."""
-        active = _fire(activity)
-        steps, places = np.nonzero(active)
-        neurons = self.by_activity[places]
+        steps, places = np.divmod(np.flatnonzero(activity != 0), max(1, activity.shape[1]))
+        known = ~np.isnan(activity[steps, places])
+        steps, neurons = steps[known], self.by_activity[places[known]]
         if len(self.by_state):
             more, places = np.nonzero((spikes != 0) & ~lesioned[self.by_state])
             steps, neurons = np.concatenate([steps, more]), np.concatenate([neurons, self.by_state[places]])

@@ -413,7 +413,7 @@ class _Together:
                 own[:wanted] = all_[kept, : own.shape[1]]
         fired = self.hands.rows.fired
         if self.spiking is not None and fired is not None:
-            activity = seen.activity[:count, self.spiking.by_activity]
+            activity = seen.activity[:count, self.spiking.activities]
             beside, lesioned = seen.states[:count, room.states.shape[1] :], state.conditions.lesioned_neurons
             fired.extend(self.spiking.of_rows(first, activity, beside, lesioned))
         if before is not None and count < made:  # too far: back to before, and up to the step that ends the run
