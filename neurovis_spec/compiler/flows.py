@@ -77,7 +77,7 @@ def is_spike(model: Definition, sent: str) -> bool:
     tree: Tree | None = next((one.each_step for one in model.gives if one.name == sent), Name(sent))
     while isinstance(tree, Name) and tree.name in let:
         tree = let[tree.name]
-    return model.fires and tree == Name(SPIKE)
+    return model.fires and isinstance(tree, Name) and tree.name == SPIKE  # wherever it is written
 
 
 def reads_spike(model: Definition, sent: str) -> bool:

@@ -602,7 +602,7 @@ def definition_of(
         let=let if spike is None else (*let, spike.fires),
         state=state if spike is None else with_spike(state, spike),
         signals=signals,
-        spikes=parts.spikes or (spike is not None and each_step == Name(SPIKE)),
+        spikes=parts.spikes or (spike is not None and isinstance(each_step, Name) and each_step.name == SPIKE),
         ports=ports,
         send=checker.sent(parts.send),
         per_second=_PER_SECOND[parts.time],
