@@ -204,3 +204,13 @@ def test_a_measure_of_the_rate(backend: str) -> None:
 def test_a_rate_that_cannot_be(measure: str, message: str) -> None:
     with pytest.raises(nv.SpecError, match=message):
         NETWORK.run(until=measure)
+
+
+def test_a_run_that_is_not_recorded_prints_rates(tmp_path: Path) -> None:
+    (tmp_path / "few.yaml").write_text(SPEC, encoding="utf-8")
+    said = CliRunner().invoke(neurovis, ["run", str(tmp_path / "few.yaml"), "--backend", "numpy"]).output
+    rates = analysis.group_firing(RUN).column("rate")
+    assert (
+        f"{len(RUN.spike_steps)} spikes; rates a neuron and a second:\n  K  {rates[0]:.6g}\n  H  {rates[1]:.6g}\n"
+        in said
+    )

@@ -252,6 +252,13 @@ def _print(network: CompiledNetwork, recording: Recording, summary: str, asked: 
         rows.append((name, " ".join(number(value) for value in values[:_MOST_SHOWN])))
     click.echo(f"{what} at step {recording.step[-1]}:")
     click.echo(table(rows))
+    if recording.spiking is not None:
+        from neurovis_spec.analysis import group_firing
+
+        found = group_firing(recording)
+        rates = [(name, number(found[name, "rate"])) for name in found.rows.labels[:_MOST_SHOWN]]
+        click.echo(f"{count(len(recording.spike_steps), 'spike')}; rates a neuron and a second:")
+        click.echo(table(rates))
     if recording.weights.shape[1]:
         least, most = recording.weights[-1].min(), recording.weights[-1].max()
         click.echo(f"{count(recording.weights.shape[1], 'changing weight')}: {number(least)} to {number(most)}")

@@ -159,6 +159,7 @@ class Recording:
         widths = self.widths
         more = f", {widths.states} states" if widths.states else ""
         more += f", {widths.sensors} sensors" if widths.sensors else ""
+        more += "" if self.spiking is None else f", {plural(len(self.spike_steps), 'spike')}"
         return (
             f"<recording of {self.network or 'a network'}: {plural(len(self), 'step')} of "
             f"{plural(widths.activity, 'neuron')}, {widths.weights} changing weights{more}>"
