@@ -214,3 +214,9 @@ def test_a_written_activity_that_is_the_spike_is_one() -> None:
         assert spiking_of(network).by_activity.tolist() == [0, 1, 2, 5]
         assert spiking_of(network).by_state.tolist() == [3, 4]
     assert spikes_of(written.run(backend="numpy")) == TRUTH
+
+
+def test_where_the_last_step_alone_is_kept_spikes_are_not() -> None:
+    run = NETWORK.run(backend="numpy", until="rate(K, last=20) > 1000", last=True)
+    assert len(run) == 1
+    assert run.spiking is None

@@ -63,7 +63,7 @@ def record(network: Network, course: Course = AS_IT_IS, progress: Progress | Non
     steps, widths = Steps(course.length(network), course.every, state.k), columns.widths(network)
     if not course.keep.last:
         check_room(steps.total, steps.every, sum(widths))
-    rows: InMemory | Last = Last(widths, state.k) if course.keep.last else InMemory(widths, len(steps), state.k)
+    rows: InMemory | Last = Last(widths) if course.keep.last else InMemory(widths, len(steps), state.k)
     if course.checkpoint is None:
         run_steps(network, state, course, rows, progress)
     else:
@@ -160,19 +160,19 @@ class InMemory:
 
 
 class Last:
-    """The last row alone, of rows of these widths, and the spikes from step ``first`` on: memory grows with these
-    alone."""
+    """The last row alone, of rows of these widths, and no spikes: memory does not grow with the steps."""
 
-    def __init__(self, widths: Widths, first: int = 0) -> None:
+    fired = None
+
+    def __init__(self, widths: Widths) -> None:
         self._widths, self._count = widths, 0
         self._rows = self._last = Rows.room(widths, 0)
-        self.fired = SpikeLog(first)
         self.asked: Asked | None = None
 
     def numbers(self, steps: Steps) -> Numbers:
         """The last that has come, for one of these steps."""
         number = [steps.at(self._count - 1)] if self._count else []
-        return Numbers(np.array(number, dtype=np.int64), self._last, self.fired.all)
+        return Numbers(np.array(number, dtype=np.int64), self._last)
 
     def begin(self, count: int) -> Rows:
         """Room for the next rows."""
