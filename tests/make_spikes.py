@@ -1,6 +1,6 @@
 """Makes ``tests/data/spikes.npz`` anew: what Brian2 makes of the networks below, on the connections and from the
-initial values of ours. ``python tests/make_spikes.py`` where Brian2 (2.9) and this package are installed;
-``test_peer_spikes`` holds our runs against the file, and needs no Brian2.
+initial values of ours. ``python tests/make_spikes.py`` where Brian2 (2.9), NEST (nest-simulator 3) and
+this package are installed; ``test_peer_spikes`` holds our runs against the file, and needs none of them.
 
 A step n of Brian2 is our step n + 1, and its refractory time is ours and a step more. Where a spike is to arrive before
 the test of the threshold, as ours with a delay do, its schedule is groups, synapses, thresholds, resets; spikes come
@@ -60,6 +60,18 @@ POST: Final = [
 ]
 STEPS: Final = 220
 
+#: A source that fires in step 10, of a neuron that a spike makes fire, and of one that only takes it.
+ORDER: Final = """neurovis: 1
+name: order
+time: {dt: 0.1 ms, steps: 20, integrate: exponential}
+inputs: {at: {spikes: {times: [[0.001]]}}}
+neurons:
+  S: {model: spike_source, input: at}
+  N: {model: {lif: {rest: 0, threshold: 1, reset: 0}}}
+  V: {model: {lif: {rest: 0, threshold: 100, reset: 0}}}
+connections: {S -> N + V: {weight: 2, port: pulses, delay: DELAY}}
+"""
+
 
 def of_steps(trains: list[list[int]], index: int | None = None) -> str:
     """Spike times for an input, in seconds, of all or one of these trains of milliseconds."""
@@ -69,7 +81,7 @@ def of_steps(trains: list[list[int]], index: int | None = None) -> str:
 
 def main() -> None:
     """Make them and write the file."""
-    brian2 = import_module("brian2")
+    brian2, nest = import_module("brian2"), import_module("nest")
     brian2.prefs.codegen.target = "numpy"
     found = {
         "brunel": delta_network(brian2, nv.compile_text(BRUNEL)),
@@ -92,6 +104,8 @@ def main() -> None:
             "w += r1*(5e-10 + 0.0062*o2); o1 += 1; o2 += 1",
         ),
         "tsodyks_markram": released(brian2),
+        "order_brian2": np.array([order_of_brian2(brian2, delay) for delay in (0, 1, 2)]),
+        "order_nest": np.array([order_of_nest(nest, delay) for delay in (1, 2)]),
     }
     for name, values in found.items():
         print(name, values.shape)
@@ -209,6 +223,42 @@ def released(b: ModuleType) -> Array:
     states = b.StateMonitor(target, "total", record=True)
     b.Network(pre, target, synapses, states).run((STEPS + 2) * b.ms)
     return np.asarray(states.total).T[1:]
+
+
+def order_of_brian2(b: ModuleType, delay: int) -> list[int]:
+    """As ORDER: by how many steps later the potential has a spike, and a neuron fires of it, in Brian2's own order."""
+    b.start_scope()
+    b.defaultclock.dt = 0.1 * b.ms
+    source = b.SpikeGeneratorGroup(1, [0], [1] * b.ms)
+    cells = b.NeuronGroup(2, "dv/dt = -v/(20*ms) : 1\nhigh : 1", threshold="v >= high", reset="v = 0", method="exact")
+    cells.high = [1, 100]
+    synapses = b.Synapses(source, cells, on_pre="v_post += 2", delay=delay * b.defaultclock.dt)
+    synapses.connect()
+    told, spikes = b.SpikeMonitor(source), b.SpikeMonitor(cells)
+    states = b.StateMonitor(cells, "v", record=[1], when="end")
+    b.Network(source, cells, synapses, told, spikes, states).run(3 * b.ms)
+    begin, fires = (round(float(monitor.t[0] / b.defaultclock.dt)) for monitor in (told, spikes))
+    return [int(np.flatnonzero(states.v[0] > 1)[0]) - begin, fires - begin]
+
+
+def order_of_nest(nest: ModuleType, delay: int) -> list[int]:
+    """The same in NEST (3.8), where there is no delay 0; the source is driven to its threshold, and takes no spike."""
+    nest.ResetKernel()
+    nest.set_verbosity("M_ERROR")
+    nest.set(resolution=0.1)
+    about = {"E_L": 0.0, "V_m": 0.0, "V_reset": 0.0, "tau_m": 20.0}
+    source = nest.Create("iaf_psc_delta", params={**about, "V_th": 1.0, "I_e": 300.0, "t_ref": 50.0})
+    cells = nest.Create("iaf_psc_delta", 2, params=[{**about, "V_th": 1.0}, {**about, "V_th": 100.0}])
+    meter = nest.Create("voltmeter", params={"interval": 0.1})
+    told, spikes = nest.Create("spike_recorder", 2)
+    nest.Connect(source, cells, syn_spec={"weight": 2.0, "delay": 0.1 * delay})
+    nest.Connect(source, told)
+    nest.Connect(cells, spikes)
+    nest.Connect(meter, cells[1])
+    nest.Simulate(5.0)
+    begin, fires = (round(float(recorder.events["times"][0]) / 0.1) for recorder in (told, spikes))
+    times = meter.events["times"][meter.events["V_m"] > 1]
+    return [round(float(times[0]) / 0.1) - begin, fires - begin]
 
 
 if __name__ == "__main__":

@@ -3,12 +3,16 @@ on the same connections and from the same initial values."""
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
-from make_spikes import ADEX, BRUNEL, COBA, FILE, POST, PRE, STEPS, of_steps
+from make_spikes import ADEX, BRUNEL, COBA, FILE, ORDER, POST, PRE, STEPS, of_steps
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.manual.networks import starts
 from neurovis_spec.runtime.recording import Recording
 
 EXPECTED = np.load(FILE)
@@ -72,3 +76,35 @@ def test_what_tsodyks_and_markrams_synapses_release() -> None:
     found = nv.compile_text(text).run(STEPS + 1, backend="numpy", states=["B.total"])["B.total"]
     assert np.abs(found - EXPECTED["tsodyks_markram"]).max() < 8e-14
     assert found[-1].min() > 1
+
+
+def test_who_sees_a_spike_when() -> None:
+    """The table of the manual is what runs say."""
+    page = (Path(__file__).parent.parent / "docs" / "language.md").read_text(encoding="utf-8")
+    _, _, part = page.partition("### Who sees a spike when")
+    assert ORDER.replace("DELAY", "1") in part
+    rows = re.findall(r"^\| (\d) \|(.*)\|$", part.partition("###")[0], re.MULTILINE)
+    assert [int(delay) for delay, _ in rows] == [0, 1, 2]
+    for delay, row in rows:
+        run = nv.compile_text(ORDER.replace("DELAY", delay)).run(backend="reference", states=["V.v"])
+        assert np.flatnonzero(run["S"]).tolist() == [10]
+        told = [int(np.flatnonzero(run["V.v"] > 1)[0]) - 10, int(np.flatnonzero(run["N"])[0]) - 10]
+        nest = ["–", "–"] if delay == "0" else EXPECTED["order_nest"][int(delay) - 1].tolist()
+        both = [*told, *nest, *EXPECTED["order_brian2"][int(delay)].tolist()]
+        assert [str(one) for one in both] == [cell.strip() for cell in row.split("|")]
+
+
+def test_networks_to_start_from_spike() -> None:
+    found = {}
+    for start in starts():
+        if start.name in ("brunel", "microcircuit", "nengo", "cuba_lif", "iaf"):
+            network = nv.compile_text(start.spec)
+            assert network.warnings == ()
+            found[start.name] = network.run(5001 if start.name == "nengo" else None, backend="numpy")
+    assert np.array_equal(fired(found["brunel"]), EXPECTED["brunel"])
+    rates = {name: (found["microcircuit"][name] != 0).mean() * 1e4 for name in ("E23", "I23", "E4", "I4")}
+    assert all(10 < rate < 80 for rate in rates.values())
+    assert found["cuba_lif"]["B"].sum() > 5
+    assert found["iaf"]["post"].sum() > 2
+    apart = np.abs(found["nengo"]["Y"] - found["nengo"]["X"])
+    assert apart[4000:].mean() < 0.12 < apart[:500].mean()
