@@ -96,3 +96,11 @@ class Controller:
         return np.frombuffer(self.memory, self.kind, self.connections, self.neurons * self.kind.itemsize).astype(
             np.float64
         )
+
+    def fired(self) -> set[int]:
+        """The neurons that have fired in the last step."""
+        mask = (ctypes.c_ubyte * self.neurons)(*([7] * self.neurons))
+        count = self._call("fired")(ctypes.addressof(self.memory), ctypes.addressof(mask))
+        assert set(mask) <= {0, 1}
+        assert sum(mask) == count
+        return {neuron for neuron, one in enumerate(mask) if one}

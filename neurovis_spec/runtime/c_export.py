@@ -33,7 +33,7 @@ from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
 from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_follow
 from neurovis_spec.runtime.c_step import Built, StepCode, begins_otherwise, write_input
-from neurovis_spec.runtime.columns import named_signals, probe_of
+from neurovis_spec.runtime.columns import named_signals, probe_of, spiking_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.lags import ring_lengths
 from neurovis_spec.runtime.signals import signal_layout
@@ -117,6 +117,9 @@ class Exported:
         self.fixing = any(order >= 0 for phase in self.phases for order in phase.order[n:of_neurons])
         self.fixing_joined = any(order >= 0 for phase in self.phases for order in phase.order[of_neurons:])
         self.clampable = network.clampable if self.fixing_joined else of_neurons if self.fixing else n
+        fires = any(one.model.definition.fires for one in network.populations)
+        #: which neurons spike, where a model has a ``spike`` block
+        self.spiking = spiking_of(network) if fires else None
         self.built = Built(self.network, signal_layout(network, own=True))
 
     # ---- what there is -----------------------------------------------------------------------------------------
@@ -194,6 +197,13 @@ class Exported:
         return "what was sent in the past, for synapses and rules" if joined else "past activities, for rules"
 
     @property
+    def marks_lesioned(self) -> bool:
+        """Whether the struct says which neurons are lesioned: their activities are held, of what else they are worth
+        outlets and spikes are 0."""
+        told = bool(self.network.outlets) or (self.spiking is not None and len(self.spiking.by_state) > 0)
+        return self.holding and told
+
+    @property
     def takes_initial(self) -> bool:
         """Whether neurons take ``initial`` at step 0, or are not integrated there."""
         return not self.state.continued and begins_otherwise(self.network)
@@ -242,7 +252,7 @@ void {name}_init({name}_state *state);
 
 /* Make one step. in may be NULL: its inputs are 0. out may be NULL. */
 void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *out);
-{setters}
+{self._fired_declared()}{setters}
 #ifdef __cplusplus
 }}
 #endif
@@ -271,7 +281,7 @@ void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *o
         if self.holding:
             about = "neurons that are held" + (", then states" if self.clampable > len(self.network.neurons) else "")
             fields.append(f"unsigned char held[{self.clampable}]; /* {about} */")
-            if self.network.outlets:
+            if self.marks_lesioned:
                 fields.append(f"unsigned char lesioned[{len(self.network.neurons)}]; /* neurons that are lesioned */")
         return fields
 
@@ -283,11 +293,25 @@ void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *o
 int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
 """
 
+    def _fired_declared(self) -> str:
+        """The declaration of the function that says who has fired; "" where nobody can."""
+        if self.spiking is None:
+            return ""
+        return f"""
+/* Say which neurons have fired in the last step: 1 of each that has, 0 of all others. Gives how many have. */
+{self._fired_head};
+"""
+
+    @property
+    def _fired_head(self) -> str:
+        """Its head."""
+        return f"int32_t {self.name}_fired(const {self.name}_state *state, unsigned char fired[{len(self.network.neurons)}])"
+
     # ---- the source --------------------------------------------------------------------------------------------
 
     def source(self) -> str:
         """The text of NAME.c. Raises ExportError."""
-        body = [*self._computing.lines, "", *self._init(), "", *self._step()]
+        body = [*self._computing.lines, "", *self._init(), "", *self._step(), *self._fired()]
         for parameter, c_name in zip(self.settable, self.settable_names, strict=True):
             body += ["", *self._set(parameter, c_name)]
         if self.holding:
@@ -423,7 +447,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         """What neurons are held at, by the parameters of now."""
         code = self._code()
         code.line("memset(state->held, 0, sizeof state->held);")
-        if self.network.outlets:
+        if self.marks_lesioned:
             code.line("memset(state->lesioned, 0, sizeof state->lesioned);")
         switch = len(self.phases) > 1
         for number, phase in enumerate(self.phases):
@@ -437,7 +461,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
                     self._hold_at(code, np.flatnonzero(order == clamp), value)
                 if phase.lesioned.any():
                     self._hold_at(code, np.flatnonzero(phase.lesioned), code.text(0.0))
-                    if self.network.outlets:
+                    if self.marks_lesioned:
                         with code.block(code.loop("i", int(phase.lesioned.sum()))):
                             code.line(f"state->lesioned[{code.at(np.flatnonzero(phase.lesioned), 'i')}] = 1;")
         return self._function(code, "What neurons are held at.", "void nv_hold", self._pointer_lines())
@@ -654,6 +678,29 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             code.line("(void)out;")
         head = f"void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *out)"
         return function(code, head, {})
+
+    def _fired(self) -> list[str]:
+        """Which neurons have fired: what the activity tells of, and what a state does."""
+        if self.spiking is None:
+            return []
+        code, spiking = self._code(), self.spiking
+        code.line("int32_t count = 0;")
+        code.line(f"memset(fired, 0, {len(self.network.neurons)});")
+        if len(spiking.by_activity):
+            with code.block(code.loop("i", len(spiking.by_activity))):
+                neuron = code.at(spiking.by_activity, "i")
+                code.line(f"const {self.real} a = state->activity[{neuron}];")
+                code.line(f"fired[{neuron}] = a != 0 && a == a;")
+                code.line(f"count += fired[{neuron}];")
+        for read in spiking.probe.reads:
+            kept, start = self._state_starts[read.owner, read.state]
+            with code.block(code.loop("i", len(read.members))):
+                neuron = code.at(spiking.by_state[read.columns], "i")
+                lesioned = f" && !state->lesioned[{neuron}]" if self.marks_lesioned else ""
+                code.line(f"fired[{neuron}] = state->{kept}[{code.at(read.members + start, 'i')}] != 0{lesioned};")
+                code.line(f"count += fired[{neuron}];")
+        code.line("return count;")
+        return ["", *function(code, self._fired_head, {})]
 
     def _set(self, parameter: str, c_name: str) -> list[str]:
         """The function that sets a parameter."""

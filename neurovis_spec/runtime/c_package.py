@@ -16,7 +16,7 @@ from neurovis_spec.arrays import Indices
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import RULE, SYNAPSE, Definition, Port, is_activation
+from neurovis_spec.compiler.program import AT_SPIKE, RULE, SYNAPSE, Definition, Port, is_activation
 from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import Call, Tree, walk
@@ -24,6 +24,7 @@ from neurovis_spec.runtime.c_export import Exported
 from neurovis_spec.runtime.c_names import words
 from neurovis_spec.runtime.c_plan import STAGES
 from neurovis_spec.runtime.c_settable import ExportError
+from neurovis_spec.runtime.events import are_spikes, takes_spikes
 from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.stages import (
     Formulas,
@@ -118,7 +119,7 @@ def size_of_state(exported: Exported) -> int:
     if len(exported.phases) > 1:
         size = -(-size // 4) * 4 + 4  # phase
     if exported.holding:  # held and lesioned
-        size += exported.clampable + len(network.neurons) * bool(network.outlets)
+        size += exported.clampable + len(network.neurons) * exported.marks_lesioned
     return -(-size // 8) * 8
 
 
@@ -201,6 +202,28 @@ def _integration(exported: Exported) -> tuple[int, list[str]]:
     return functions, lines
 
 
+def _of_spikes(exported: Exported) -> list[str]:
+    """What spikes make of a step, at worst; none where nobody fires."""
+    network, spiking = exported.network, exported.spiking
+    if spiking is None:
+        return []
+    visited = np.zeros(len(network.connections), dtype=np.bool_)
+    spikes = are_spikes(network)
+    for population in network.populations:
+        for port in population.ports:
+            if takes_spikes(network, port, spikes):
+                visited[port.incoming] = True
+    for one in network.projections:
+        if any(one.use.definition.has(phase) for phase in AT_SPIKE):
+            visited[one.members] = True
+    may = f"{plural(len(spiking.neurons), 'neuron')} may fire; {plural(int(visited.sum()), 'connection')} of these"
+    return [
+        f"- spikes: {may} wait for them, and take time",
+        "  where one comes. What is counted here is the worst case, a step in which all fire; all else takes the same",
+        "  time in each step",
+    ]
+
+
 def _learning(network: Network, centres: bool) -> int:
     """How many connections have a rule that changes their weights, or their centres."""
     rules = (one for one in network.projections if one.kind == RULE)
@@ -229,6 +252,7 @@ def _cost(exported: Exported) -> str:
     drawn += sum(entry.size for entry in network.inputs if entry.is_drawn)
     lines = [
         f"- {plural(len(network.connections), 'connection')}: a multiplication and an addition each",
+        *_of_spikes(exported),
         *stages,
         f"- {functions + at_stages} calls of functions such as exp and tanh",
     ]
@@ -260,7 +284,7 @@ and nothing else: no heap, no files, no variables that change but the struct tha
 {name}_step(&state, &in, &out);   /* once a step, every {network.dt:g} s */
 ```
 
-After call k, `state.activity` is a[k - 1] and `state.weights` w[k], in the order of a recording. Events of the spec
+{_fired(exported)}After call k, `state.activity` is a[k - 1] and `state.weights` w[k], in the order of a recording. Events of the spec
 apply at their steps. A copy of the struct is a copy of all that the run carries.
 
 {_interface(exported)}
@@ -281,6 +305,21 @@ The state takes {size_of_state(exported)} bytes where a pointer has 8. A step ta
 `-ffp-contract=off` keeps a compiler from joining a product and a sum, which rounds otherwise than the reference does,
 and `-fno-builtin-exp` and its like from working out functions itself; so the numbers are those of
 `neurovis run --backend c`, bit for bit where the C library is the same.
+"""
+
+
+def _fired(exported: Exported) -> str:
+    """How a caller asks who has fired; "" where nobody can."""
+    if exported.spiking is None:
+        return ""
+    name = exported.name
+    return f"""Spikes are events of a step. Who has fired in the last one is asked behind the call, before the next:
+
+```c
+unsigned char fired[{name.upper()}_NEURONS];
+int32_t count = {name}_fired(&state, fired);   /* how many; fired[i]: whether neuron i has */
+```
+
 """
 
 

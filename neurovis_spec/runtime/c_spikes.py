@@ -127,9 +127,8 @@ class Firing:
                 code.line("    continue;")
                 sent, then = taken_at(self.ends.network, code, ends, "q"), ""
                 if rows.delays.any():
-                    then = "ago"
-                    code.line(f"const int32_t ago = {code.at(ago, 'q')};")
-                    row = f"(size_t)((k + {depth} - ago) % {depth})*{self.count}"
+                    then = f"({code.at(ago, 'q')})"
+                    row = f"(size_t)((k + {depth} - {then}) % {depth})*{self.count}"
                     sent = f"history[{row} + {code.at(ends, 'q')}]"
                 total = f"{name}[{code.at(arrivals.slots, 'q')}]"
                 arrivals.add_spike(total, "q", slice(None), sent, then, None)

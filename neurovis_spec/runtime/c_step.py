@@ -52,7 +52,7 @@ from neurovis_spec.compiler.values.spikes import FIRES
 from neurovis_spec.language.expressions.emit_c import Made, Value
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of
-from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
+from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name, words_of
 from neurovis_spec.runtime.c_connections import Ends, Forming, Sight, Some, taken, taken_at
 from neurovis_spec.runtime.c_plan import Plan, plan_of
 from neurovis_spec.runtime.c_spikes import Firing
@@ -792,7 +792,7 @@ class StepCode:
         def received(place: Place, totals: Mapping[int, str] = _NO_TOTALS) -> None:
             some = Some(number, np.arange(len(members)), place)
             conditions = [f"!gone[{code.at(members, place)}]"] if self.form.gone else []
-            conditions += self.sight.comes(projection, some)
+            conditions += self.sight.comes(projection, some) if self.form.written_out else []  # a row knows of it
             with code.block(f"if ({' && '.join(conditions)})") if conditions else nullcontext():
                 stored, seen = self.sight.states(some), self.sight.known(some, read)
                 kept = partial(self.unless_held, projection.use, place)
@@ -815,11 +815,14 @@ class StepCode:
         with self.firing.before(rows, sight.sent or bool(delays.all())) as (ago, row, _):
             starts, order = code.tables.name(rows.starts), code.at(rows.order, "e")
             with code.block(code.loop("e", f"{starts}[{row} + 1]", f"{starts}[{row}]")):
-                code.line(f"const int32_t q = {order};")
+                first = len(code.lines)
                 if self.form.lost and ago:
                     code.line(f"if (k - {ago} < lost[{code.at(members, 'q')}])")
                     code.line("    continue;")
                 yield "q"
+                if "q" in words_of(code.lines[first:]):  # not with one member alone
+                    code.line(f"const int32_t q = {order};")
+                    code.lines.insert(first, code.lines.pop())
 
     def signals(self) -> None:
         """The signal of each connection with a synapse as it is behind a step, into ``formed``; 0 of one that is left
@@ -870,18 +873,16 @@ class StepCode:
             leaving = [(slot, code.let("s", signal)) for slot, signal in leaving]
         if self.form.still:
             self.store(leaving)
-        stores = [self.connection(projection, place) for place in places]
-        for name, made in zip(sums, stores, strict=False):
-            for _, value in made:
-                if not isinstance(value, float):  # x − x is 0, or NaN where x is not finite
-                    code.line(f"{name} += {value} - {value};")
-        if not self.form.still:
-            self.store(leaving)
-        for made in stores:
-            self.store(made)
-        if isinstance(places[0], int) and self.leaves_out(projection, places[0]):
-            code.indent -= 1
-            code.line("}")
+        with self.where_carried_out(projection, places[0]):
+            stores = [self.connection(projection, place) for place in places]
+            for name, made in zip(sums, stores, strict=False):
+                for _, value in made:
+                    if not isinstance(value, float):  # x − x is 0, or NaN where x is not finite
+                        code.line(f"{name} += {value} - {value};")
+            if not self.form.still:
+                self.store(leaving)
+            for made in stores:
+                self.store(made)
 
     def store_each(self, count: int, made: Callable[[Place], tuple[str, Value]]) -> None:
         """As many values, each in its cell."""
@@ -900,13 +901,6 @@ class StepCode:
         """The weight and the states of one connection, at a step and, where it has one, at an episode's end: where
         each is stored, and what."""
         code, connection = self.code, self.code.at(projection.members, place)
-        if conditions := self.leaves_out(projection, place):
-            if isinstance(place, int):
-                code.line(f"if ({' && '.join(conditions)}) {{")
-                code.indent += 1
-            else:
-                code.line(f"if ({conditions[0].removeprefix('!')})")
-                code.line("    continue;")
         rule = projection.use
         seen = code.parameters(rule, place) | self.behind.clock(rule.definition) | self.seen(projection, place)
         stored = self.states(rule, place)
@@ -921,13 +915,20 @@ class StepCode:
         new, _ = self.change(rule.definition, seen, stored, bounded=bounded, begins=self.form.first)
         return [(stored[name], value) for name, value in new.items()]
 
-    def leaves_out(self, projection: Projection, place: Place) -> list[str]:
-        """What must hold of a connection for its rule to be carried out; a loop over what has fired knows of that."""
-        conditions = [f"!still[{self.code.at(projection.members, place)}]"] if self.form.still else []
+    @contextmanager
+    def where_carried_out(self, projection: Projection, place: Place) -> Iterator[None]:
+        """What is carried out of the rule of one connection, where it is; a loop over what has fired knows of that."""
+        code = self.code
+        conditions = [f"!still[{code.at(projection.members, place)}]"] if self.form.still else []
         if projection.when and isinstance(place, int):
             some = Some(projection.use.owner.number, np.arange(len(projection.members)), place)
             conditions += self.behind.comes(projection, some)
-        return conditions
+        if conditions and not isinstance(place, int):
+            code.line(f"if ({conditions[0].removeprefix('!')})")
+            code.line("    continue;")
+            conditions = []
+        with code.block(f"if ({' && '.join(conditions)})") if conditions else nullcontext():
+            yield
 
     def bounded(self, projection: Projection, place: Place, weight: Value) -> Value:
         """A new weight within its bounds."""

@@ -1,0 +1,152 @@
+"""What spikes beside all that takes a network: exported C, edits of a live run, checkpoints, modules, sweeps."""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from exported import LANGUAGES, exported
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from random_spikes import spiking_specs
+
+import neurovis_spec as nv
+from neurovis_spec.runtime import c_export
+
+#: groups that fire, one whose activity is something else, inputs of spikes, a synapse and a rule that wait for some
+SPEC = """\
+neurovis: 1
+name: seams
+time: {dt: 1 ms, steps: 120, episode: 50}
+parameters: {g: 1.5, threshold: 1}
+models:
+  cell:
+    time: ms
+    parameters: {tau: {value: 20, unit: ms}, threshold: 1}
+    ports: [kick]
+    state: {v: {initial: 0.2, derivative: (drive - v)/tau, jump: kick}}
+    spike: {when: v >= threshold, set: {v: 0}, refractory: 2 ms, hold: v}
+  shown:
+    time: ms
+    state: {v: {derivative: (drive - v)/5}}
+    spike: {when: v >= 1, set: {v: 0}}
+    activity: v
+inputs:
+  train: {spikes: {times: [[0.01, 0.02], [0.03]]}, size: 2}
+  rain: {size: 2, poisson: 80}
+synapses:
+  trace:
+    time: ms
+    state: {s: {derivative: -s/5, on_pre: s + weight}}
+    signal: s*(2 - post.v)
+rules:
+  pair:
+    time: ms
+    state: {a: {derivative: -a/20, on_pre: a + 0.1}, b: {derivative: -b/20, on_post: b - 0.1}}
+    weight: {on_pre: weight + b, on_post: weight + a}
+neurons:
+  K: {count: 2, model: {cell: {threshold: threshold}}, bias: [1.3, 1.6], input: {kick: train}}
+  H: {count: 2, model: cell, bias: g, input: {kick: rain}}
+  P: {count: 2, model: shown, bias: [1.4, 2]}
+  O: {count: 2}
+connections:
+  K -> H: {weight: 0.2, pattern: all_to_all, port: kick, delay: 2 ms, plasticity: pair}
+  H -> K: {weight: 0.3, pattern: all_to_all, synapse: trace}
+  P -> H: {weight: 0.1, pattern: one_to_one, send: spike, port: kick}
+  K -> O: {pattern: one_to_one}
+outputs: {out: O, fired: P.spike}
+"""
+EVENTS = """\
+events:
+  - {from: 20 ms, to: 24 ms, clamp: {K1: 1}}
+  - {at: 10 ms, lesion: [H2, P2]}
+  - {at: 60 ms, mend: [H2, P2]}
+  - {at: 70 ms, set: {g: 1.9}}
+"""
+NETWORK = nv.compile_text(SPEC)
+
+
+def fires_alike(network: nv.CompiledNetwork, folder: Path, language: str = "C99", steps: int = 40) -> None:
+    """Activities, weights and who has fired are those of the reference, bit for bit."""
+    expected = network.run(steps + 1, backend="reference")
+    fired = set(zip(expected.spike_steps.tolist(), expected.spike_neurons.tolist(), strict=True))
+    controller = exported(network, folder, language)
+    for k in range(steps):
+        np.testing.assert_array_equal(controller.weights[network.network.changing], expected.weights[k], f"w[{k}]")
+        controller.step()
+        np.testing.assert_array_equal(controller.activity, expected.activity[k], f"a[{k}]")
+        assert controller.fired() == {neuron for step, neuron in fired if step == k}
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize(("small", "language"), [(0, "C99"), (600, "C99"), (0, "C++17")])
+def test_exported_c_fires_as_the_reference_does(
+    small: int, language: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert language in LANGUAGES
+    monkeypatch.setattr(c_export, "SMALL", small)
+    fires_alike(nv.compile_text(SPEC + EVENTS), tmp_path, language, 100)
+
+
+@pytest.mark.compiler
+@settings(max_examples=6, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=spiking_specs(), small=st.sampled_from([0, 600]))
+def test_random_networks_that_spike_run_alike_when_exported(spec: dict[str, object], small: int) -> None:
+    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        warnings.simplefilter("ignore")
+        patch.setattr(c_export, "SMALL", small)
+        try:
+            network = nv.compile(spec)
+        except nv.SpecError:  # a cycle without delay
+            return
+        fires_alike(network, Path(folder), steps=15)
+
+
+@pytest.mark.compiler
+def test_exported_c_with_numbers_of_32_bits_fires(tmp_path: Path) -> None:
+    expected = NETWORK.run(60, backend="reference")
+    controller = exported(NETWORK, tmp_path, real="float")
+    counts = []
+    for _ in range(60):
+        controller.step()
+        counts.append(len(controller.fired()))
+    assert sum(counts) == pytest.approx(len(expected.spike_steps), rel=0.1)
+    assert 0 in counts
+
+
+def test_the_readme_says_what_spikes_take_at_worst(tmp_path: Path) -> None:
+    NETWORK.export(tmp_path)
+    readme = (tmp_path / "README.md").read_text(encoding="ascii")
+    assert "int32_t count = seams_fired(&state, fired);" in readme
+    assert "- spikes: 6 neurons may fire; 12 connections of these wait for them" in readme
+    quiet = nv.compile_text("neurovis: 1\nname: quiet\nneurons: {O: {count: 2}}\n")
+    quiet.export(tmp_path / "quiet")
+    assert all("fired" not in path.read_text(encoding="ascii") for path in (tmp_path / "quiet").iterdir())
+
+
+@pytest.mark.parametrize("seconds", [0.0012, 0.0027])
+def test_a_rule_that_waits_for_spikes_has_a_delay_of_whole_steps(seconds: float) -> None:
+    """Where what is sent flows, and would arrive between steps: a spike comes once, at the end of one."""
+    text = """\
+neurovis: 1
+name: between
+time: {dt: 1 ms, steps: 40}
+models:
+  wave: {time: ms, state: {x: {initial: 0.1, derivative: y + 0.1*drive}, y: {initial: 0.4, derivative: -x}},
+         spike: {when: x > 0.2}, activity: x}
+rules: {counts: {state: {n: {on_pre: n + 1}}, weight: {on_pre: weight + 1}}}
+neurons: {A: {model: wave, bias: 0.3}, B: {model: wave}}
+connections: {A -> B: {weight: 0.2, delay: {seconds: SECONDS}, plasticity: counts}}
+"""
+    network = nv.compile_text(text.replace("SECONDS", str(seconds)))
+    runs = [network.run(backend=name, states=["(A -> B).n"]) for name in ("reference", "numpy")]
+    delay = round(seconds / 0.001)
+    fired = runs[0].spike_steps[runs[0].spike_neurons == 0]
+    assert len(fired) > 3
+    arrived = [(fired <= k - delay).sum() for k in range(40)]
+    for run in runs:
+        np.testing.assert_array_equal(run["(A -> B).n"].ravel(), arrived)
+    np.testing.assert_array_equal(runs[0].activity, runs[1].activity)
