@@ -150,3 +150,22 @@ connections: {A -> B: {weight: 0.2, delay: {seconds: SECONDS}, plasticity: count
     for run in runs:
         np.testing.assert_array_equal(run["(A -> B).n"].ravel(), arrived)
     np.testing.assert_array_equal(runs[0].activity, runs[1].activity)
+
+
+AT_ONCE = """\
+neurovis: 1
+name: at_once
+time: {dt: 1 ms, steps: 12}
+models: {cell: {state: {u: {initial: 0.2, each_step: 0.7*u + drive}}, spike: {when: u > 0.5, set: {u: u - 0.4}}}}
+synapses: {fades: {state: {g: {each_step: 0.5*g, on_pre: g + weight}}, signal: g/MOST}}
+neurons: {A: {model: cell, bias: 1}, B: {}}
+connections: {A -> B: {synapse: fades, delay: 0}}
+"""
+
+
+def test_what_spikes_do_at_once_is_done_once_where_a_run_is_checked() -> None:
+    """A formula that may be undefined has its run checked, of which the program is made anew."""
+    plain, checked = (nv.compile_text(AT_ONCE.replace("MOST", most)) for most in ("1", "(2 - 1/(1 + g))"))
+    runs = [network.run(backend="reference", states=["(A -> B).g"]) for network in (plain, checked)]
+    assert runs[0]["(A -> B).g"].max() > 0.9
+    np.testing.assert_array_equal(runs[0]["(A -> B).g"], runs[1]["(A -> B).g"])

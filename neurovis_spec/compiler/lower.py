@@ -106,7 +106,9 @@ def receiving(
     their populations, by the numbers of the projections."""
     made: list[Operation] = []
     for operation in program:
-        if isinstance(operation, Receive) and not projections[operation.projection].at_once:
+        if isinstance(operation, Receive):
+            if operation.phases == ("on_pre",) and projections[operation.projection].at_once:
+                made.append(operation)  # it stays behind all updates
             continue
         made.append(operation)
         if isinstance(operation, Gather | Update) and operation != Gather(operation.population, now=True):

@@ -305,7 +305,8 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
     @property
     def _fired_head(self) -> str:
         """Its head."""
-        return f"int32_t {self.name}_fired(const {self.name}_state *state, unsigned char fired[{len(self.network.neurons)}])"
+        count = len(self.network.neurons)
+        return f"int32_t {self.name}_fired(const {self.name}_state *state, unsigned char fired[{count}])"
 
     # ---- the source --------------------------------------------------------------------------------------------
 

@@ -269,6 +269,7 @@ def _cost(exported: Exported) -> str:
 def _readme(exported: Exported) -> str:
     name, network = exported.name, exported.network
     neurons, connections = plural(len(network.neurons), "neuron"), plural(len(network.connections), "connection")
+    fired = _fired(exported)
     kept = "".join(f"\n{line}. `--set` of the export gives it another.\n" for line in _fixed(exported))
     return f"""# {words(network.title or network.name)}
 
@@ -284,7 +285,8 @@ and nothing else: no heap, no files, no variables that change but the struct tha
 {name}_step(&state, &in, &out);   /* once a step, every {network.dt:g} s */
 ```
 
-{_fired(exported)}After call k, `state.activity` is a[k - 1] and `state.weights` w[k], in the order of a recording. Events of the spec
+{fired}\
+After call k, `state.activity` is a[k - 1] and `state.weights` w[k], in the order of a recording. Events of the spec
 apply at their steps. A copy of the struct is a copy of all that the run carries.
 
 {_interface(exported)}
