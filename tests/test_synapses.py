@@ -248,6 +248,54 @@ connections: {A -> B: {weight: 1, synapse: {s: {E: E}}}}
 """
 
 
+ONE_BEHIND_THE_OTHER = """
+time: {dt: 0.1}
+models:
+  cell:
+    ports: [g, h]
+    state: {v: {initial: 1, derivative: drive - v}}
+    outputs: {r: v + g, q: v + h}
+    activity: v
+  last: {state: {v: {derivative: drive - v}}, activity: v}
+synapses:
+  of_q: {signal: weight*(pre.v - post.q)}
+  of_r: {signal: weight*(pre.v - post.r)}
+  passed_on: {signal: weight*(pre.r + 2*pre.q)}
+neurons: {A: {model: cell, count: 2, bias: [1, 2]}, B: {model: last, bias: 3}}
+connections:
+- B -> A1: {synapse: of_q, port: g, weight: 0.3}
+- B -> A2: {synapse: of_r, port: h, weight: 0.3}
+- A -> B: {synapse: passed_on, weight: 0.7, delay: 0}
+"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_an_output_is_made_behind_another_of_the_same_neuron_that_a_synapse_reads(backend: str) -> None:
+    """With rk4, each neuron in an order of its own."""
+
+    def slopes(x: FloatArray) -> FloatArray:
+        a, b, v = x.tolist()
+        total = 0.7 * (a + 0.3 * (v - a)) + 1.4 * a  # A1 has q = v, and r behind it
+        total += 0.7 * b + 1.4 * (b + 0.3 * (v - b))  # A2 has r = v, and q behind it
+        return np.array([1 - a, 2 - b, total + 3 - v])
+
+    x = np.array([1.0, 1.0, 0.0])
+    simulation = Simulation(network_of(ONE_BEHIND_THE_OTHER), backend)
+    simulation.step()
+    for _ in range(10):
+        k1 = slopes(x)
+        k2 = slopes(x + 0.05 * k1)
+        k3 = slopes(x + 0.05 * k2)
+        x = x + 0.1 / 6 * (k1 + 2 * k2 + 2 * k3 + slopes(x + 0.1 * k3))
+        simulation.step()
+        np.testing.assert_allclose(simulation.activity, x, rtol=1e-13)
+
+
+def test_outputs_of_a_neuron_that_read_each_other_through_synapses_are_a_loop() -> None:
+    with pytest.raises(nv.SpecError, match=r"A1\.[qr] -> A1\.[qr]"):
+        network_of(ONE_BEHIND_THE_OTHER.replace("B -> A2", "B -> A1"))
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("what", ["A -> B", "A", "B"])
 def test_the_states_of_what_is_lesioned_stay_and_it_brings_nothing(backend: str, what: str) -> None:

@@ -410,23 +410,47 @@ class _Coupled:
         """For each neuron its level within a stage. Without a synapse a neuron waits for whatever it takes, else for
         what reads ports there; a synapse that reads such an output of its target makes it wait for itself. Where
         neurons would wait for each other, they wait for what reads ports alone: one may send such a thing beside one
-        that reads none."""
-        level = self._levels_of_stage(~self.synapse)
+        that reads none. Where only one would wait for itself, what is taken of it may have an order."""
+        nothing, itself = np.zeros(len(self.synapse), dtype=np.bool_), self.taken.any("post", self._closing)
+        level = self._levels_of_stage(~self.synapse, itself)
         if isinstance(level, Cycle):
-            level = self._levels_of_stage(np.zeros(len(self.synapse), dtype=np.bool_))
+            level = self._levels_of_stage(nothing, itself)
+        if isinstance(level, Cycle) and itself.any():
+            among, own = self._levels_of_stage(nothing, nothing), self._levels_of_own()
+            if not isinstance(among, Cycle) and not isinstance(own, Cycle):
+                return np.unique(np.vstack((among, own)), axis=1, return_inverse=True)[1].reshape(-1)
         return level._replace(algebraic=True) if isinstance(level, Cycle) else level
 
-    def _levels_of_stage(self, always: BoolArray) -> IntArray | Cycle:
-        """The same, where ``always`` are the connections (m,) whose target waits for whatever it takes."""
-        edges, taken = [], self.taken
-        closing = self.made & np.logical_or.reduce([self.through[port] for port in self.wired.lines])
-        before = (taken.any("pre", closing) | always) & self.now
-        behind = taken.any("post", closing)
+    @cached_property
+    def _closing(self) -> BoolArray:
+        """(names, n): whether what is taken of a neuron by a name is made anew at a stage of what a port reads."""
+        return self.made & np.logical_or.reduce([self.through[port] for port in self.wired.lines])
+
+    def _levels_of_stage(self, always: BoolArray, itself: BoolArray) -> IntArray | Cycle:
+        """For each neuron its level, where the target of some connections (m,) waits ``always`` for whatever it takes,
+        and that of others for ``itself``."""
+        edges = []
+        before = (self.taken.any("pre", self._closing) | always) & self.now
         for port, (_, connections, sources, targets) in self.open.items():
             waits = self.staged[port] & self._passed_on(port, self.making)[targets]
-            for begins, of in ((sources, waits & before[connections]), (targets, waits & behind[connections])):
+            for begins, of in ((sources, waits & before[connections]), (targets, waits & itself[connections])):
                 edges.append((connections[of], begins[of], targets[of]))
         return levels_along(len(self.model), *_joined(edges))
+
+    def _levels_of_own(self) -> IntArray | Cycle:
+        """(names, n): the level of what is taken of a neuron by a name among all that is taken of it: what reads a port
+        stands behind what synapses there read of their target."""
+        n, taken = len(self.model), self.taken
+        place = np.arange(len(taken.names) * n).reshape(len(taken.names), n)
+        edges = []
+        for port, (_, connections, _, targets) in self.open.items():
+            for read in taken.each("post", np.where(self._closing, place, -1)):
+                of = self.staged[port] & (read[connections] >= 0)
+                for own, places in zip(self.through[port] & self.made, place, strict=True):
+                    waits = of & own[targets]
+                    edges.append((connections[waits], read[connections[waits]], places[targets[waits]]))
+        level = levels_along(place.size, *_joined(edges))
+        return level if isinstance(level, Cycle) else level.reshape(place.shape)
 
     def _waits(self, known: BoolArray) -> tuple[Indices, Indices, Indices]:
         """Who waits for whom within a step: the connection (−1 for none), the first, and the one that waits. ``known``:

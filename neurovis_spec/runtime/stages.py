@@ -39,6 +39,7 @@ from neurovis_spec.compiler.program import (
     Port,
     Projection,
 )
+from neurovis_spec.compiler.values.definitions import sorted_by_need
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 
 Let: TypeAlias = tuple[tuple[str, Tree], ...]
@@ -100,7 +101,7 @@ class Through(NamedTuple):
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
     """A population at a stage. What is ``taken`` of all populations comes first (``taken_in_order``), then the
-    derivatives of all."""
+    derivatives of all. Of what is taken each is behind what it needs of the same neurons."""
 
     number: int
     population: Population
@@ -204,15 +205,16 @@ def parts_of(
             if model.reads_activation:
                 activation = replace(activation, definition=with_slope(activation.definition))
                 population = replace(population, activation=activation)
-        own = [(name, places) for (owner, name), places in taken.items() if owner == number]
+        own = {
+            name: Taken(formulas_of(population, [(name, given(model, name))]), places, name == MODEL.gives)
+            for (owner, name), places in taken.items()
+            if owner == number
+        }
         parts.append(
             Part(
                 number,
                 population,
-                tuple(
-                    Taken(formulas_of(population, [(name, given(model, name))]), places, name == MODEL.gives)
-                    for name, places in own
-                ),
+                tuple(own[name] for name in _in_own_order(network, own, contacts)),
                 formulas_of(population, [(one.name, one.derivative) for one in model.flows]),
                 formulas_of(population, slopes.diagonal.items(), slopes.let),
                 formulas_of(population, [(one.name, one.noise) for one in model.flows]),
@@ -220,6 +222,16 @@ def parts_of(
             )
         )
     return tuple(parts)
+
+
+def _in_own_order(network: Network, own: Mapping[str, Taken], contacts: Mapping[int, Contacts]) -> list[str]:
+    """The names of what is taken of a population, each behind what of it synapses read at the ports that it reads."""
+    needs: dict[str, set[str]] = {name: set() for name in own}
+    for name, one in own.items() if len(own) > 1 else ():
+        for formed in (found for port in one.formulas.ports for found in formed_at(network, _staged(port))):
+            for end in (end for text, end in contacts[formed.number].ends.items() if text.startswith("post")):
+                needs[name] |= {other for other in own if np.isin(own[other].places, end.places).any()}
+    return sorted_by_need(needs)[0]
 
 
 def _at_stages(network: Network, population: Population) -> Population:
@@ -432,7 +444,8 @@ def taken_by(network: Network) -> Indices:
 
 def taken_in_order(parts: Iterable[Part]) -> list[tuple[Part, Taken]]:
     """All that is taken at a stage, each behind what it needs: first what reads no port; then by the levels of a step,
-    in which whoever sends what reads a port is behind all who bring such a thing there."""
+    in which whoever sends what reads a port is behind all who bring such a thing there; of one population as the part
+    has it."""
     every = [(part, one) for part in parts for one in part.taken]
     return sorted(every, key=lambda one: one[0].population.level if one[1].formulas.ports else -1)
 
