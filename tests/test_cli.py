@@ -457,6 +457,13 @@ def test_new_from_an_example_is_that_example_under_another_name(folder: Path, ex
     np.testing.assert_array_equal(mine.run(50).activity, theirs.run(50).activity)
 
 
+@pytest.mark.parametrize("start", ["force", "som"])
+def test_new_from_a_network_of_the_manual_is_that_network(folder: Path, start: str) -> None:
+    assert good("new", "mine", "--from", start) == "mine.yaml\n"
+    assert good("validate", "mine.yaml").startswith("mine.yaml: ok (")
+    assert "name: mine\n" in (folder / "mine.yaml").read_text(encoding="utf-8")
+
+
 def test_new_overwrites_nothing(folder: Path) -> None:
     (folder / "data").mkdir()
     (folder / "data" / "centres.csv").write_text("mine\n", encoding="utf-8")
@@ -473,7 +480,7 @@ def test_new_may_share_the_data_of_an_example(folder: Path) -> None:
 
 
 LISTS = {
-    ("new", "--from"): {"cpg_rbf", "hexapod"},
+    ("new", "--from"): {"cpg_rbf", "hexapod", "force"},
     ("run", "--backend"): {"c", "numpy", "reference"},
     ("sweep", "--backend"): {"c", "numpy", "reference"},
     ("live", "--backend"): {"c", "numpy", "reference"},

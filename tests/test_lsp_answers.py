@@ -477,6 +477,35 @@ def test_renaming_renames_in_signals_of_states_and_of_sources(at: str, new: str)
     assert renamed(SIGNALS.replace(at, f"{old}¦: {{", 1), new) == expected
 
 
+STATES = """neurovis: 1
+name: states
+models:
+  one: {state: {v: {derivative: drive - v}}, activity: v}
+  two: {state: {v: {derivative: -v}}, outputs: {w: 2*v}, activity: v}
+synapses: {trace: {state: {g: {derivative: pre - g}}, signal: weight*g}}
+rules: {r: {signals: [err], state: {tr: {each_step: pre}}, weight: {each_step: weight + 0.1*err*tr}}}
+modules: {leg: {neurons: {K: {model: one}}}}
+instances: {left: {module: leg}}
+neurons: {A: {count: 2, model: {one: {}}}, B: {model: two}}
+connections: {A -> B: {synapse: trace, pattern: all_to_all, plasticity: {r: {err: A1.v}}}}
+outputs: {a: A1.v, b: [B.v, left.K.v], g: (A1 -> B).g, e: (A -> B).tr, more: A1..A2.v + B.w}
+events: [{from: 1, to: 4, clamp: {A.v: 0.5, B.v: 1, (A1 -> B).g: 0.2, left.K.v: 0}}]
+"""
+
+
+def test_a_state_is_renamed_wherever_it_is_named_behind_its_neurons_or_connections() -> None:
+    def after(old: str, new: str) -> str:
+        return re.sub(old, new, STATES)
+
+    one = after(r"(?<=one: {state: {)v|(?<=A\d\.)v|(?<=A\.)v|(?<=left\.K\.)v", "volt")
+    one = one.replace("derivative: drive - v}}, activity: v}", "derivative: drive - volt}}, activity: volt}")
+    assert renamed(STATES.replace("one: {state: {v", "one: {state: {v¦"), "volt") == one
+    assert renamed(STATES.replace("a: A1.v", "a: A1.v¦"), "volt") == one
+    assert renamed(STATES.replace("trace: {state: {g", "trace: {state: {g¦"), "q") == after(r"\bg\b(?!: \()", "q")
+    assert renamed(STATES.replace("(A -> B).tr", "(A -> B).tr¦"), "trail") == after(r"\btr\b", "trail")
+    assert renamed(STATES.replace("{w: 2", "{w¦: 2"), "twice") == after(r"\bw\b", "twice")
+
+
 def test_the_owner_of_a_state_that_is_a_signal_leads_to_its_group() -> None:
     document, place = marked(SIGNALS.replace("from: K.v", "from: K¦.v"))
     found = definition(document, place)

@@ -217,6 +217,15 @@ def test_what_cannot_be_symmetric_is_told() -> None:
         network("M -> N: {symmetric: true, port: a, pattern: all_to_all}")
 
 
+def test_as_many_pairs_as_are_made_count_towards_the_limit() -> None:
+    text = "neurovis: 1\nname: x\nneurons: {A: {count: 9}}\nconnections: {A -> A: {symmetric: true, PATTERN}}"
+    for pattern in ("pattern: all_to_all", "pattern: {random: {probability: 1}}"):
+        made = text.replace("PATTERN", pattern)
+        assert len(nv.compile_text(made, limit=72).network.connections) == 72
+        with pytest.raises(nv.SpecError, match="this makes 72 connections; the limit is 71"):
+            nv.compile_text(made, limit=71)
+
+
 @pytest.mark.parametrize("size", ["", "render: {size: [900, 700]}\n"])
 def test_a_line_that_leads_both_ways_has_a_head_at_either_end(size: str) -> None:
     made = network("M -> M: {pattern: chain, weight: -1, symmetric: true}\n  - M1 -> M3: 1", size)

@@ -137,6 +137,18 @@ def test_a_definition_that_nobody_uses(kind: str, body: str) -> None:
         assert warnings(f"{body}\nneurons: {{A: {{{kind}: cube, bias: 1}}}}\n") == []
 
 
+@pytest.mark.parametrize(
+    ("definition", "use"),
+    [
+        ("rules: {cube: {weight: {each_step: weight + pre^3}}}", "plasticity"),
+        ("synapses: {cube: {signal: pre^3}}", "synapse"),
+    ],
+)
+def test_what_an_entry_names_that_draws_no_connection_is_used(definition: str, use: str) -> None:
+    body = f"{definition}\n{PAIR}connections: {{A -> B: {{pattern: {{random: {{probability: 0}}}}, {use}: cube}}}}\n"
+    assert ("unused-definition", "cube") not in warnings(body)
+
+
 def test_a_default_that_is_replaced_is_used() -> None:
     body = "activations: {identity: {value: 2*x}}\nneurons: {A: {bias: 1}}\n"
     assert warnings(body) == [("replaces-builtin", "identity")]

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
 
 import click
 
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import check_target, writing
 from neurovis_spec.cli.options import examples, listed
+
+if TYPE_CHECKING:
+    from neurovis_spec.manual.networks import Start
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 _NAME_LINE = re.compile(r"^name:[^\n]*$", re.MULTILINE)
@@ -39,16 +43,33 @@ def examples_at_hand() -> Mapping[str, Traversable]:
     return dict(sorted(found.items()))
 
 
+def _starts() -> Iterable[Start]:
+    from neurovis_spec.manual.networks import starts
+
+    return starts()
+
+
+def _listed() -> tuple[str, ...]:
+    """The names of the examples, then those of the manual's networks to start from."""
+    return *examples_at_hand(), *(one.name for one in _starts())
+
+
+def _known() -> tuple[str, ...]:
+    """The same, with what else finds the networks of the manual."""
+    return *_listed(), *(called for one in _starts() for called in one.called)
+
+
 @click.command(epilog=examples("neurovis new first", "neurovis new walking --from cpg_rbf", "neurovis new --from list"))
 @click.argument("name", metavar="NAME")
 @listed(
     "example",
-    examples_at_hand,
-    examples_at_hand,
+    _known,
+    _listed,
     "--from",
     "example",
     metavar="EXAMPLE",
-    text="Copy an example with its data and included files; 'list' shows which there are.",
+    text="Copy an example with its data and included files, or a network to start from of the manual (force); 'list' "
+    "shows which there are.",
 )
 def command(name: str, example: str | None) -> None:
     """Write a commented starter spec NAME.yaml, or a copy of an example.
@@ -63,6 +84,9 @@ def command(name: str, example: str | None) -> None:
     if example is None:
         text = package_files("neurovis_spec.cli").joinpath("starter.yaml").read_text(encoding="utf-8")
         wanted = {target: text.replace("starter.", f"{target.stem}.").encode()}
+    elif example not in examples_at_hand():
+        (text,) = (one.spec for one in _starts() if example in (one.name, *one.called))
+        wanted = {target: text.encode()}
     else:
         if examples_at_hand()[example].name == example:  # a folder of its own
             target = target.parent / target.stem / target.name

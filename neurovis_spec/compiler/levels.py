@@ -418,13 +418,15 @@ class _Coupled:
         if isinstance(level, Cycle) and itself.any():
             among, own = self._levels_of_stage(nothing, nothing), self._levels_of_own()
             if not isinstance(among, Cycle) and not isinstance(own, Cycle):
-                return np.unique(np.vstack((among, own)), axis=1, return_inverse=True)[1].reshape(-1)
+                kinds: IntArray = np.unique(np.vstack((among, own)), axis=1, return_inverse=True)[1]
+                return kinds.reshape(-1)
         return level._replace(algebraic=True) if isinstance(level, Cycle) else level
 
     @cached_property
     def _closing(self) -> BoolArray:
         """(names, n): whether what is taken of a neuron by a name is made anew at a stage of what a port reads."""
-        return self.made & np.logical_or.reduce([self.through[port] for port in self.wired.lines])
+        through = [self.through[port] for port in self.wired.lines]
+        return np.asarray(self.made & np.logical_or.reduce(through))
 
     def _levels_of_stage(self, always: BoolArray, itself: BoolArray) -> IntArray | Cycle:
         """For each neuron its level, where the target of some connections (m,) waits ``always`` for whatever it takes,

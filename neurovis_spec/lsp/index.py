@@ -8,7 +8,7 @@ instances of a module share their names. Of another file the modules and the def
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
@@ -73,17 +73,47 @@ class Index:
     @property
     def _lookup(self) -> Lookup:
         return Lookup(
-            self.module_of, self._is_signal, lambda name: ("outputs", name) in self.keys, self._models_with.get
+            self.module_of,
+            self._is_signal,
+            lambda name: ("outputs", name) in self.keys,
+            self._models_with.get,
+            self._model_of,
+            self._joining_with.get,
         )
+
+    def _with(self, sections: Collection[str], parts: Collection[str]) -> Mapping[str, tuple[str, str]]:
+        """The definition of some sections, by its section and its name, that alone declares something there, by the
+        name of that."""
+        found: dict[str, set[tuple[str, str]]] = {}
+        for item in self.all_items:
+            path = item.path
+            if item.is_key and len(path) == 4 and path[0] in sections and path[2] in parts:
+                found.setdefault(str(path[3]), set()).add((str(path[0]), str(path[1])))
+        return {name: definition for name, (definition, *others) in found.items() if not others}
 
     @cached_property
     def _models_with(self) -> Mapping[str, str]:
         """The model that alone declares a state, an output or a parameter, by the name of that."""
-        found: dict[str, set[str]] = {}
-        for item in self.all_items:
-            if item.is_key and len(item.path) == 4 and item.path[0] == "models" and item.path[2] in _OF_ENDS:
-                found.setdefault(str(item.path[3]), set()).add(str(item.path[1]))
-        return {name: model for name, (model, *others) in found.items() if not others}
+        return {name: model for name, (_, model) in self._with(("models",), _OF_ENDS).items()}
+
+    @cached_property
+    def _joining_with(self) -> Mapping[str, tuple[str, str]]:
+        """The rule or synapse that alone declares a state, by the name of that."""
+        return self._with(("synapses", "rules"), ("state",))
+
+    def _model_of(self, name: str, module: str | None) -> str | None:
+        """The model that a group names, which is called so or of which this is a neuron, in a module; None where it
+        names none. Names are found by it, so that it goes by the keys alone."""
+        neurons = ("neurons",) if module is None else ("modules", module, "neurons")
+        for home in (self, *(() if module is None else self.others)):
+            for path in ((*neurons, name), (*neurons, name.rstrip("0123456789"))):
+                named = home.values.get((*path, "model"))
+                if named is not None:
+                    return named.text
+                settings = (str(key[-1]) for key in home.keys if key[:-1] == (*path, "model"))
+                if (found := next(settings, None)) is not None:
+                    return found
+        return None
 
     @cached_property
     def declarations(self) -> tuple[Name, ...]:

@@ -75,13 +75,15 @@ class Name:
 @dataclass(frozen=True)
 class Lookup:
     """What the reading of some names needs to know of others: the module of an instance, whether a setting of a rule
-    is a signal, whether an output is called so, and the model that alone has a state, an output or a parameter of a
-    name."""
+    is a signal, whether an output is called so, the model that alone has a state, an output or a parameter of a name,
+    the model of a group or a neuron of a module, and the definition of connections that alone has a state of a name."""
 
     module_of: Callable[[str, str | None], str | None]
     is_signal: Callable[[str, str], bool]
     is_output: Callable[[str], bool]
     model_with: Callable[[str], str | None]
+    model_of: Callable[[str, str | None], str | None]
+    joining_with: Callable[[str], tuple[str, str] | None]
 
 
 def names_of(items: Iterable[Item], text: Text, lookup: Lookup) -> Iterator[Name]:
@@ -102,7 +104,7 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
             else:
                 yield from _formula(item, role, scope, text, lookup)
         case "ends" | "references":
-            yield from _references(item, scope, text, lookup, stately=item.path[:1] == ("outputs",))
+            yield from _references(item, scope, text, lookup, stately=_may_be_states(item.path))
         case "setting":
             assert role.kind is not None
             definition = Scope(None, (SECTIONS[role.kind], str(item.path[-2])))
@@ -120,6 +122,11 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
             if role.kind == "module" or role.kind in SECTIONS:
                 scope = Scope()
             yield _whole(item, role.kind, scope, text, declares)
+
+
+def _may_be_states(path: Path) -> bool:
+    """Whether references at a path may be to states: what leaves the network, and what is held."""
+    return path[:1] == ("outputs",) or (path[:1] == ("events",) and path[2:3] == ("clamp",))
 
 
 def setting_of(path: Path) -> tuple[str, str]:
@@ -166,20 +173,24 @@ def _of_ends(item: Item, text: Text, lookup: Lookup) -> Iterator[Name]:
 
 
 def _references(item: Item, scope: Scope, text: Text, lookup: Lookup, stately: bool = False) -> Iterator[Name]:
-    """The names of neurons and instances; where it is ``stately`` the last one may be a state of these."""
-    written = list(_dotted(parse(item.text)))
+    """The names of neurons and instances; where it is ``stately`` the last one may be a state of these, or of
+    connections."""
+    found = parse(item.text)
+    written = list(_dotted(found))
     steps = [(step.start, step.end) for name, _ in written for step in name.steps]
     places = iter(_inside(item, text, steps))
     way: list[tuple[Scope | None, Name | None]] = []  # where the instances of the name before lead
     for name, shared in written:
         way = way[:shared]
         here, via = way[-1] if way else (Scope(scope.module), None)
+        model: str | None = None
         *instances, last = name.steps
         for number, step in enumerate(instances, 1):
             span, exact = next(places)
             module = None if here is None else lookup.module_of(step.text, here.module)
             if here is not None and stately and number == len(instances) and module is None:
                 yield Name("neuron", step.text, span, here, item, False, exact, via)  # K.v is the state v of K
+                model = lookup.model_of(step.text, here.module)
             elif here is not None:
                 via = Name("instance", step.text, span, here, item, False, exact, via)
                 yield via
@@ -188,6 +199,13 @@ def _references(item: Item, scope: Scope, text: Text, lookup: Lookup, stately: b
         span, exact = next(places)
         if here is not None and last.text:
             yield Name("neuron", last.text, span, here, item, False, exact, via)
+        elif model is not None:
+            yield Name("local", last.text, span, Scope(None, (SECTIONS["model"], model)), item, False, exact)
+    for part in found.parts if stately and isinstance(found, Sum) else ():
+        if isinstance(part, RuleState) and (definition := lookup.joining_with(part.state)) is not None:
+            state = part.end - len(part.state), part.end
+            span, exact = _inside(item, text, [*(step for step in steps if step[1] < state[0]), state])[-1]
+            yield Name("local", part.state, span, Scope(None, definition), item, False, exact)
 
 
 def _dotted(written: Sum | Arrow | Part) -> Iterator[tuple[DottedName, int]]:

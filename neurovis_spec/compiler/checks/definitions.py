@@ -378,13 +378,15 @@ def _in_silence(tree: Tree, rule: Defined) -> Value:
 
 def check_unused(compiled: Compiled, findings: Findings) -> None:
     """Warn of definitions of the spec's own that are not used. What a module names counts as used, even if it has no
-    instance."""
-    network = compiled.network
+    instance, and so do rules and synapses of connections of which none is drawn."""
+    network, choices = compiled.network, [*_choices(compiled)]
     used = {
         ACTIVATION: {group.activation for group in network.neurons.groups},
         MODEL: {group.model for group in network.neurons.groups},
-        RULE: {one.use.definition.name for one in network.projections if one.kind == RULE},
-        SYNAPSE: {choice.name.value for section, choice in _choices(compiled) if section == SYNAPSE.section},
+        **{
+            kind: {choice.name.value for section, choice in choices if section == kind.section}
+            for kind in (RULE, SYNAPSE)
+        },
     }
     modules = [library.source.get("modules") for library in compiled.libraries]
     named = {text for node in modules if node is not None for text in _texts_in(node)}

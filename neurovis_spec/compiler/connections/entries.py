@@ -361,6 +361,16 @@ class EntryBuilder:
         self.constants.findings.error("too-many", self.key.span, message, "raise it with --limit")
         return False
 
+    def _may_fit(self, least: int) -> bool:
+        """The same before the pairs are made, of which there are ``least``: within a group those of a symmetric entry
+        are halved, and none of a neuron with itself is kept."""
+        sources, targets = self.sources, self.targets
+        if sources is UNKNOWN or targets is UNKNOWN or not self.symmetric:
+            return self._fits(least)
+        if np.array_equal(sources, targets):
+            least = max(least - len(sources), 0) // 2
+        return self._fits(least)
+
     def _grid(self, matrix: MatrixRows | FileReference, purpose: str) -> Grid | Unknown:
         """A matrix of this entry, sources as rows; UNKNOWN where it is invalid."""
         by_target = self.body.rows is not None and self.body.rows.value == "to"
@@ -415,7 +425,7 @@ class EntryBuilder:
         """The pairs of a pattern. Some patterns connect by position, so ends with an invalid one are not known."""
         assert self.body.pattern is not None
         ends = UNKNOWN if self._misplaced() else self._ends()
-        pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._fits)
+        pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._may_fit)
         if ends is not UNKNOWN and self.body.pattern.name.value == "nearest":  # what places neurons is structural then
             self.context.census.go_by_position(np.concatenate((ends.sources, ends.targets)))
         return UNKNOWN if pairs is UNKNOWN else _Shape(narrow(pairs[0]), narrow(pairs[1]))
