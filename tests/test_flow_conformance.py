@@ -130,6 +130,34 @@ def test_an_edit_of_nothing_changes_nothing(spec: Spec, cut: int) -> None:
             np.testing.assert_array_equal(seen.weights, expected.weights)
 
 
+@settings(max_examples=10, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=flowing_specs(), cut=st.integers(1, STEPS - 1))
+def test_an_edit_elsewhere_changes_nothing(spec: Spec, cut: int) -> None:
+    """Another group, and a connection of it with a state and a longer delay, before all others: what flows at neurons
+    and synapses, and what is under way, is found in its new place."""
+    network = compiled(spec)
+    synapse = {"aside": {"state": {"aside": {"derivative": "pre - aside"}}, "signal": "aside"}}
+    other = compiled(
+        {
+            **spec,
+            "synapses": {**synapse, **spec["synapses"]},
+            "neurons": {"Aside": {"count": 2}, **spec["neurons"]},
+            "connections": {"Aside1 -> Aside2": {"synapse": "aside", "delay": 5}, **spec["connections"]},
+        }
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        plain, edited = (SimulatedSource(Simulation(network, "numpy")) for _ in range(2))
+        for k in range(STEPS):
+            if k == cut:
+                edited = carried(edited, Simulation(other, "numpy"))
+            for one in (plain, edited):
+                one.advance()
+            seen, expected = edited.seen().snapshot, plain.seen().snapshot
+            np.testing.assert_array_equal(seen.activity[-len(network.neurons) :], expected.activity)
+            np.testing.assert_array_equal(seen.weights[len(seen.weights) - len(expected.weights) :], expected.weights)
+
+
 LOOP = """
 neurovis: 1
 name: loop
