@@ -44,6 +44,23 @@ def test_a_command_reads_no_signal_of_a_synapse() -> None:
         carted(spec=spec + synapse).run(3)
 
 
+@pytest.mark.parametrize("backend", ["numpy", pytest.param("c", marks=pytest.mark.compiler)])
+def test_a_command_reads_a_state_of_a_synapse_which_goes_on_where_it_was(backend: str, tmp_path: Path) -> None:
+    synapse = "synapses: {gap: {state: {g: {each_step: 0.5*g + pre}}, signal: weight*g - 0.1*post}}\n"
+    joined = SPEC.replace("{weight: -0.7}", "{weight: -0.7, synapse: gap, delay: 3}")
+    compiled = carted(spec=joined.replace("drive: O1", "drive: (P -> O1).g") + synapse)
+    whole = compiled.run(60, backend=backend)
+    np.testing.assert_allclose(whole.pose, compiled.run(60, backend="reference").pose, rtol=1e-12)
+    simulation, other = compiled.simulator(backend), compiled.simulator(backend)
+    for _ in range(25):
+        simulation.step()
+    simulation.save_state(tmp_path / "state")
+    other.restore(tmp_path / "state")
+    for _ in range(35):
+        other.step()
+    np.testing.assert_array_equal(other.activity, whole.activity[-1])
+
+
 def by_hand(steps: int, given: str, backend: str) -> Recording:
     """A run as a loop of one's own: the network without a body, and a cart beside it."""
     bare = replace(carted().network, body=None)

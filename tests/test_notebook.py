@@ -70,9 +70,9 @@ class Notebook:
 
 
 @contextmanager
-def notebook(steps: int | None = None) -> Iterator[Notebook]:
+def notebook(steps: int | None = None, spec: str = SPEC) -> Iterator[Notebook]:
     """A widget of a run, or of a recording of so many steps."""
-    network = nv.compile_text(SPEC)
+    network = nv.compile_text(spec)
     widget = network.live(None if steps is None else network.run(steps))
     try:
         yield Notebook(widget)
@@ -100,6 +100,18 @@ def test_a_frame_is_sent_the_page_the_scene_and_frames_as_fast_as_it_draws() -> 
         serial = int.from_bytes(it.binary["a"][-1][4:8], "little")
         it.say("a", serial.to_bytes(4, "little"))
         until(lambda: len(it.kinds("a")) > 3)
+
+
+@pytest.mark.parametrize("steps", [None, 20])
+def test_connections_with_synapses_and_delays_are_shown(steps: int | None) -> None:
+    synapse = "synapses: {gate: {parameters: {E: 1}, state: {g: {derivative: pre - g}}, signal: weight*g*(E - post)}}\n"
+    with notebook(steps, SPEC.replace("{weight: mix}", "{synapse: {gate: {E: 3*mix}}, delay: 2}") + synapse) as it:
+        it.say("a", open=True)
+        until(lambda: len(it.kinds("a")) >= 2)
+        assert it.kinds("a")[:2] == [SCENE, FRAME]
+        if steps is None:
+            it.widget.mix = 0.25
+            until(lambda: any("0.25" in json.dumps(one) for one in it.texts["a"]))
 
 
 def test_it_stands_still_while_nobody_looks() -> None:
