@@ -206,6 +206,25 @@ PICTURES = (
         views=("network",),
     ),
     Picture(
+        "balance",
+        "balance",
+        1151,
+        "Spikes: excitation and inhibition in balance",
+        "E9 and I3 fire, since spikes arrive that E3 and E2 sent 1.5 ms ago: these, and I2, which fired with them, "
+        "fade. A line takes the colour of the spike that leaves, blue where it adds to the potential of its target and "
+        "orange where it takes away.",
+        views=("network",),
+    ),
+    Picture(
+        "balance_figure",
+        "balance",
+        1151,
+        "The same with a raster of 100 ms",
+        "A mark for each spike. Each cell is driven above its threshold, and would fire regularly if it were alone.",
+        views=("network", "raster: E, I"),
+        window=1000,
+    ),
+    Picture(
         "walk",
         "walk/walk",
         52,
@@ -304,6 +323,7 @@ BESIDE = {
     " what drives it.",
     "stick_insect": "Each joint is drawn in its own way, and they stand one above the other.",
     "worm": "dot has no place for what is where in the worm, and makes ranks of what goes around in circles.",
+    "balance": "dot crosses fewer lines only where it is told of no boxes.",
     "walk": "As above, C2 stands below C1, and the kernels are out of order.",
     "hexapod": "dot draws six legs six times: each has other ranks and another place for its parts, left and right are"
     " no mirror images, and the delay lines run down, one beside the other. Free of all that it needs less room and may"
