@@ -14,7 +14,13 @@ from hypothesis import strategies as st
 from random_spikes import spiking_specs
 
 import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.live.carry import carried
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.turns import Hold, Set, Turn
 from neurovis_spec.runtime import c_export
+from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.state import State
 
 #: groups that fire, one whose activity is something else, inputs of spikes, a synapse and a rule that wait for some
 SPEC = """\
@@ -169,3 +175,127 @@ def test_what_spikes_do_at_once_is_done_once_where_a_run_is_checked() -> None:
     runs = [network.run(backend="reference", states=["(A -> B).g"]) for network in (plain, checked)]
     assert runs[0]["(A -> B).g"].max() > 0.9
     np.testing.assert_array_equal(runs[0]["(A -> B).g"], runs[1]["(A -> B).g"])
+
+
+STEPS = 16
+
+
+@settings(max_examples=12, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=spiking_specs(), cut=st.integers(0, STEPS - 1))
+def test_an_edit_of_nothing_and_a_checkpoint_change_nothing(spec: dict[str, object], cut: int) -> None:
+    """Who is armed, who rests, what was sent and what is under way go on in the edited network, bit for bit."""
+    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+        warnings.simplefilter("ignore")
+        try:
+            network = nv.compile(spec).network
+        except nv.SpecError:  # a cycle without delay
+            return
+        plain, edited = (SimulatedSource(Simulation(network, "numpy")) for _ in range(2))
+        plainly, kept = (Simulation(network, "numpy") for _ in range(2))
+        for k in range(STEPS):
+            if k == cut:
+                edited = carried(edited, Simulation(network, "numpy"))
+                plainly.save_state(Path(folder) / "kept.npz")
+                kept.restore(Path(folder) / "kept.npz")
+            for one in (plain, edited):
+                one.advance()
+            plainly.step()
+            if k >= cut:
+                kept.step()
+            np.testing.assert_array_equal(edited.seen().snapshot.activity, plain.seen().snapshot.activity)
+            np.testing.assert_array_equal(edited.seen().snapshot.weights, plain.seen().snapshot.weights)
+        alike(plainly.state(), kept.state())
+
+
+def alike(one: State, other: State) -> None:
+    """All numbers are the same."""
+    for name in ("activity", "outlets", "weights", "signals", "history"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
+    for owner, cells in one.cells.items():
+        for name, values in cells.items():
+            np.testing.assert_array_equal(values, other.cells[owner][name], name)
+
+
+def seen_by(source: SimulatedSource, steps: int, turns: dict[int, Turn]) -> dict[int, FloatArray]:
+    """The activities of steps, with turns at some."""
+    seen = {}
+    for _ in range(steps):
+        source.advance()
+        if source.step in turns:
+            source.turn(turns[source.step])
+        seen[source.step] = source.seen().snapshot.activity.copy()
+    return seen
+
+
+def test_the_live_view_goes_back_over_spikes_and_on() -> None:
+    turns: dict[int, Turn] = {30: Hold("K1", 1), 40: Set({"g": 2})}
+    source = SimulatedSource(nv.compile_text(SPEC + EVENTS).simulator(backend="numpy"))
+    seen = seen_by(source, 100, turns)
+    for step in (99, 33, 12, 66, 30, 100):
+        source.go(step)
+        np.testing.assert_array_equal(source.seen().snapshot.activity, seen[step])
+
+
+@pytest.mark.parametrize("at", [3, 20, 42])
+def test_an_edit_goes_on_with_who_is_armed_and_who_rests(at: int) -> None:
+    """Neurons of the same name fire on as they would: another group stands before them, and one is no more."""
+    edited = SPEC.replace("neurons:\n", "neurons:\n  First: {count: 3, model: cell, bias: 1.1}\n").replace(
+        "  K -> O: {pattern: one_to_one}\n", ""
+    )
+    source = SimulatedSource(NETWORK.simulator(backend="numpy"))
+    seen_by(source, at, {})
+    other = carried(source, nv.compile_text(edited).simulator(backend="numpy"))
+    expected = NETWORK.run(at + 20, backend="reference")
+    seen = seen_by(other, 20 - 1, {})
+    for step, activity in seen.items():
+        np.testing.assert_array_equal(activity[3:9], expected.activity[step, :6])
+
+
+def test_an_edit_may_make_neurons_fire_and_stop_that() -> None:
+    fires = """\
+neurovis: 1
+name: e
+time: {dt: 1 ms}
+models: {m: {time: ms, state: {v: {derivative: (drive - v)/9}}, BLOCK}}
+neurons: {A: {model: m, bias: 2}}
+"""
+    without = fires.replace("BLOCK", "activity: v")
+    block = fires.replace("BLOCK", "spike: {when: v >= 1, set: {v: 0}, refractory: 3, hold: v}")
+    source = SimulatedSource(nv.compile_text(without).simulator(backend="numpy"))
+    assert max(seen_by(source, 40, {})[40]) > 1.9
+    firing = carried(source, nv.compile_text(block).simulator(backend="numpy"))
+    spikes = [step for step, activity in seen_by(firing, 30, {}).items() if activity[0]]
+    assert len(spikes) > 2
+    silent = carried(firing, nv.compile_text(without).simulator(backend="numpy"))
+    assert len(set(np.concatenate([*seen_by(silent, 20, {}).values()]))) == 20
+
+
+def test_modules_sweeps_and_texts_take_spikes(tmp_path: Path) -> None:
+    """Groups that fire within instances, swept over a parameter of the block; the text says the same again."""
+    text = """\
+neurovis: 1
+name: halves
+time: {dt: 1 ms, steps: 200}
+models:
+  cell:
+    time: ms
+    parameters: {tau: 10, threshold: 1}
+    ports: [kick]
+    state: {v: {derivative: (drive - v)/tau, jump: kick}}
+    spike: {when: v >= threshold, set: {v: 0}, refractory: 1 ms}
+modules:
+  half:
+    parameters: {high: 1}
+    neurons: {E: {count: 2, model: {cell: {threshold: high}}, bias: [1.5, 2]}}
+instances: {left: {module: half, set: {high: 1.2}}, right: {module: half}}
+connections: {left.E -> right.E: {weight: 0.3, port: kick, pattern: one_to_one}}
+"""
+    network = nv.compile_text(text)
+    runs = [network.run(backend=name) for name in ("reference", "numpy")]
+    np.testing.assert_array_equal(runs[0].activity, runs[1].activity)
+    assert len(runs[0].spikes("right.E").times) > len(runs[0].spikes("left.E").times) > 0
+    assert nv.compile_text(network.text()).hash == network.hash
+    (tmp_path / "swept.yaml").write_text(SPEC, encoding="utf-8")
+    table = nv.sweep(tmp_path / "swept.yaml", {"threshold": [0.8, 1.2]}, {"often": "rate(K, last=100)"}, jobs=1)
+    first, second = (float(str(cell)) for cell in table["often"])
+    assert first > second > 0
