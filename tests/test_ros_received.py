@@ -270,6 +270,47 @@ def test_a_live_run_follows_pauses_and_goes_back(compiled: nv.CompiledNetwork, s
     assert 5 <= source.shown <= 95
 
 
+GATES = """
+neurovis: 1
+name: x
+time: {dt: 0.01}
+models: {cell: {state: {v: {derivative: drive - v}}, activity: v}}
+synapses: {gate: {state: {g: {initial: 0.5, derivative: pre.v - g}}, signal: weight*g*(1 - post.v)}}
+neurons: {A: {model: cell, bias: 1}, B: {model: cell}, C: {}}
+connections: {A -> B: {weight: 2, synapse: gate, delay: 2}, B -> A: {send: v, delay: 3}, B -> C: {plasticity: hebbian}}
+"""
+
+
+def test_synapses_whose_signals_do_not_come_are_shown_and_drawn_without(tmp_path: Path) -> None:
+    """States and what is formed of them are not known of what comes; all else is."""
+    gates = nv.compile_text(GATES)
+    source, shown = ReceivedSource(gates.network), list[Shown]()
+    run = Run(source, view_of(gates, gates.gains_for(None)), shown.append)
+    run.start()
+    try:
+        come(source, range(9))
+        until(lambda: bool(shown) and shown[-1].glance.step == 8)
+    finally:
+        run.end()
+    assert run.failure is None
+    made, path = gates.run(20), tmp_path / "x.mcap"
+    listening = Listening(gates, 2, Wanted(path), print)
+    listening.start()
+    for row in range(20):
+        for name, values in (("activity", made.activity[row]), ("weights", made.weights[row])):
+            data = ArrayForm.of(label_of(made.hash), len(values), "cdr").message(row, 1e9 + row, values)
+            listening.put(f"/neurovis/x/{name}", Arrival(data, row * 10**6, None, ARRAY))
+    until(lambda: listening.counts["weights"].recorded == 20)
+    listening.end()
+    read = nv.load(path)
+    assert np.array_equal(read.activity, made.activity)
+    with pytest.warns(RuntimeWarning, match=r"does not hold B\.v, \(A -> B\)\.signal, .* their lines have no colour"):
+        gates.render(tmp_path / "x.svg", recording=read, step=19)
+    assert "nan" not in (tmp_path / "x.svg").read_text()
+    with pytest.warns(UserWarning, match="lacks states with a derivative, as of A, which begin anew"):
+        assert gates.run(5, start=read).reached == 25
+
+
 #: topic, step, values
 Sent = tuple[str, int, FloatArray]
 
