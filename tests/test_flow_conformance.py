@@ -10,7 +10,7 @@ import pytest
 from hypothesis import Phase, assume, given, settings
 from hypothesis import strategies as st
 from random_flows import flowing_specs
-from random_specs import Spec
+from random_specs import Plain, Spec
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
@@ -136,15 +136,13 @@ def test_an_edit_elsewhere_changes_nothing(spec: Spec, cut: int) -> None:
     """Another group, and a connection of it with a state and a longer delay, before all others: what flows at neurons
     and synapses, and what is under way, is found in its new place."""
     network = compiled(spec)
-    synapse = {"aside": {"state": {"aside": {"derivative": "pre - aside"}}, "signal": "aside"}}
-    other = compiled(
-        {
-            **spec,
-            "synapses": {**synapse, **spec["synapses"]},
-            "neurons": {"Aside": {"count": 2}, **spec["neurons"]},
-            "connections": {"Aside1 -> Aside2": {"synapse": "aside", "delay": 5}, **spec["connections"]},
-        }
-    )
+    more: dict[str, dict[str, Plain]] = {
+        "synapses": {"aside": {"state": {"aside": {"derivative": "pre - aside"}}, "signal": "aside"}},
+        "neurons": {"Aside": {"count": 2}},
+        "connections": {"Aside1 -> Aside2": {"synapse": "aside", "delay": 5}},
+    }
+    before = {section: part for section in more if isinstance(part := spec[section], dict)}
+    other = compiled({**spec, **{section: {**own, **before[section]} for section, own in more.items()}})
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         plain, edited = (SimulatedSource(Simulation(network, "numpy")) for _ in range(2))
