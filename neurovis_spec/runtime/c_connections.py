@@ -216,9 +216,10 @@ class Sight:
         if not own.any():
             return now
         is_rule = self.network.projections[some.number].kind == RULE
-        if self.sent and is_rule and self.ends.lags is not None and self.ends.lags.there[connections].any():
-            return self.between_steps(connections, self.ends.lags, end.places[some.which], place)
-        if own_of(self.late(connections), place).any():
+        lags = None if end.rounded else self.ends.lags
+        if self.sent and is_rule and lags is not None and lags.there[connections].any():
+            return self.between_steps(connections, lags, end.places[some.which], place)
+        if lags is not None and own_of(lags.there[connections], place).any():
             value = self.remembered(connections, index, place, *self.steps_ago(delays, place))
         else:
             value = self.past(index, delays, place)

@@ -328,7 +328,7 @@ def end_at(step: Step, members: IntArray, end: End) -> str:
     """Something that connections read of an end: as it is now, or what was sent by their delays ago."""
     delays, places = step.network.connections.delays[members], end.places
     past = np.asarray(end.past & (delays > 0))
-    late = past & (False if step.lags is None else step.lags.there[members])
+    late = past & (False if step.lags is None or end.rounded else step.lags.there[members])
     past &= ~late
     if past.all():
         return _past(step, members, places)

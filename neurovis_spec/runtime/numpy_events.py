@@ -12,7 +12,8 @@ import numpy as np
 
 from neurovis_spec.compiler.program import SYNAPSE, Key, Projection
 from neurovis_spec.runtime.events import rows_of
-from neurovis_spec.runtime.numpy_arrivals import Step, Working, all_sent, end_at
+from neurovis_spec.runtime.numpy_arrivals import Step, Working, all_sent
+from neurovis_spec.runtime.numpy_lags import behind_lags
 from neurovis_spec.runtime.numpy_spikes import come_to
 from neurovis_spec.runtime.stages import End, behind_flow, ends_of, target_of
 from neurovis_spec.runtime.state import NEVER_LOST
@@ -46,10 +47,14 @@ def seen_by(step: Step, working: Working, which: str, read: Collection[str]) -> 
     for name, values in use.parameters.items():
         if name in read:
             seen[name] = code.numbers_of(Key(use.owner, name), values, some, which)
-    behind = behind_flow(step.network, projection) if projection.kind == SYNAPSE else {}
+    is_synapse = projection.kind == SYNAPSE
+    behind = behind_flow(step.network, projection) if is_synapse else {}
+    late = {} if is_synapse else behind_lags(step, projection)
     for name, end in ends_of(step.network, projection).items():
         if name in read and name in behind:
             seen[name] = _behind(step, projection, behind[name], which)
+        elif name in read and name in late:
+            seen[name] = code.let("a", f"{late[name]}[{which}]")
         elif name in read:
             seen[name] = code.let("a", _end(step, projection, end, which))
     return seen
@@ -67,8 +72,6 @@ def _behind(step: Step, projection: Projection, state: str, which: str) -> str:
 def _end(step: Step, projection: Projection, end: End, which: str) -> str:
     """What some connections read of an end."""
     code, delays = step.code, step.network.connections.delays[projection.members] * int(end.past)
-    if end.past and step.lags is not None and step.lags.there[projection.members].any():
-        return f"{end_at(step, projection.members, end)}[{which}]"
     places = code.constant(np.ascontiguousarray(end.places, dtype=np.intp))
     now = f"{all_sent(step)}[{places}[{which}]]"
     if (end.places >= len(step.network.neurons) + step.network.outlet_count).any():

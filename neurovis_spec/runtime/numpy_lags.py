@@ -48,7 +48,7 @@ def behind_lags(step: Step, projection: Projection) -> dict[str, str]:
     lags, found = step.lags.some(members), {}
     there, others = np.flatnonzero(lags.there), np.flatnonzero(~lags.there)
     for name, end in ends_of(step.network, projection).items():
-        if end.past:
+        if end.past and not end.rounded:
             parts = [(_behind_step(step, lags.some(there), members[there], end.places[there]), there)]
             if len(others):
                 rest = end_at(step, members[others], End(end.places[others], past=True))

@@ -232,16 +232,17 @@ class Seen:
         for name, end in self.ends[projection.use.owner.number].items():
             index = int(end.places[position])
             if end.past and self.delays[connection] > 0:
-                found[name] = self.past(connection, index, state, share)
+                found[name] = self.past(connection, index, state, share, end.rounded)
             else:
                 found[name] = self.at(index, state) if now is None else now(index)
         return found
 
-    def past(self, connection: int, index: int, state: State, share: float | None) -> float:
-        """An activity or an outlet of d steps ago, 0 where that is lost; with a continuous delay at the first step what
-        it was before, too, and as it was before this ``share`` of the step was over, if it is said."""
+    def past(self, connection: int, index: int, state: State, share: float | None, rounded: bool) -> float:
+        """An activity or an outlet of d steps ago, 0 where that is lost; with a continuous delay that is not
+        ``rounded`` at the first step what it was before, too, and as it was before this ``share`` of the step was over,
+        if it is said."""
         step = state.k - int(self.delays[connection])
-        if self.lags is None or not self.lags.there[connection]:
+        if self.lags is None or rounded or not self.lags.there[connection]:
             return self.remembered(connection, index, step, state)
         least = NEVER_LOST if state.continued else 0
         if share is None:

@@ -30,6 +30,7 @@ from neurovis_spec.compiler.flows import (
 from neurovis_spec.compiler.levels import held_at
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
+    AT_SPIKE,
     MODEL,
     SYNAPSE,
     Definition,
@@ -128,10 +129,12 @@ class Part:
 
 class End(NamedTuple):
     """What connections read of an end: where each of them finds it, an index into the activities of all neurons
-    followed by the outlets; and whether it is what was sent by their delays ago, rather than what is now."""
+    followed by the outlets; and whether it is what was sent by their delays ago, rather than what is now. Spikes lie on
+    no line between two steps: continuous delays are ``rounded`` there."""
 
     places: IntArray
     past: bool
+    rounded: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -347,7 +350,8 @@ def ends_of(network: Network, projection: Projection) -> dict[str, End]:
         found = {"pre": End(sent, True), "sent": End(sent, False)}
     if "post" in read:
         found["post"] = End(network.connections.targets[members], False)
-    found |= {name: End(places, name.startswith("pre.")) for name, places in projection.ends.items()}
+    ends = projection.ends.items()
+    found |= {name: End(places, name.startswith("pre."), name == AT_SPIKE["on_pre"]) for name, places in ends}
     found |= {name: End(places, False) for name, places in projection.signals.items()}
     return {name: end for name, end in found.items() if name in read}
 
