@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from time import monotonic
 from typing import Final, NamedTuple, Protocol
@@ -362,6 +362,8 @@ class _Together:
     #: whose spikes are noted, None where nobody spikes
     spiking: Spiking | None = None
     watched: Watched | None = None
+    #: the last rows that were made for every step: new ones cost as much as what is put there
+    _seen: list[Rows] = field(default_factory=list)
 
     def steps(self, state: State, first: int, stop: int) -> bool:
         every, rows = self.hands.every, self.hands.rows
@@ -427,9 +429,11 @@ class _Together:
 
     def _room_for(self, count: int, room: Rows) -> Rows:
         """Rows for every step, with the states that tell of spikes behind those that are kept."""
-        more = 0 if self.spiking is None else len(self.spiking.by_state)
-        states = np.empty((count, room.states.shape[1] + more))
-        return Rows(*(np.empty((count, array.shape[1])) for array in room))._replace(states=states)
+        if not self._seen or len(self._seen[0].activity) < count:
+            more = 0 if self.spiking is None else len(self.spiking.by_state)
+            states = np.empty((count, room.states.shape[1] + more))
+            self._seen[:] = [Rows(*(np.empty((count, array.shape[1])) for array in room))._replace(states=states)]
+        return self._seen[0].part(slice(count))
 
     def _most(self, every: int) -> int:
         """The most steps to be seen at once: where spikes are looked for in rows that are not kept, as many as there
