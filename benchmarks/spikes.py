@@ -166,9 +166,11 @@ def ours(key: str, path: str) -> None:
     print(json.dumps({"seconds": seconds, "compile": compiled, "spikes": spikes, "memory": peak()}))
     if path:
         there = network.connections
-        given = {"sources": there.sources, "targets": there.targets, "weights": there.weights, "delays": there.delays}
+        there = network.connections
         v = next(array for own in initial_state(network).cells.values() for array in own.values())
-        np.savez(path, v=v, bias=network.neurons.bias, steps=case.steps, **given)
+        ends = {"sources": there.sources[:], "targets": there.targets[:], "delays": there.delays[:]}
+        numbers = {"v": v, "bias": network.neurons.bias, "weights": there.weights[:], "steps": np.array(case.steps)}
+        np.savez(path, **ends, **numbers)  # type: ignore[arg-type]
 
 
 def peak() -> int:

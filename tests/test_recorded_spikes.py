@@ -220,3 +220,12 @@ def test_where_the_last_step_alone_is_kept_spikes_are_not() -> None:
     run = NETWORK.run(backend="numpy", until="rate(K, last=20) > 1000", last=True)
     assert len(run) == 1
     assert run.spiking is None
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_neurons_that_all_show_something_else_have_their_spikes(backend: str) -> None:
+    text = SPEC[: SPEC.index("neurons:")] + "neurons: {H: {count: 20, model: shown, bias: 1.2}}\n"
+    network = nv.compile_text(text)
+    seen = np.argwhere(network.run(backend="reference", states=["H.spike"])["H.spike"] != 0)
+    for every in (1, 50):
+        assert spikes_of(network.run(backend=backend, every=every)) == [tuple(one) for one in seen.tolist()]

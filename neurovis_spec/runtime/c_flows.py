@@ -42,10 +42,11 @@ from neurovis_spec.compiler.program import (
     Port,
     Projection,
     SendAhead,
+    Use,
 )
 from neurovis_spec.language.expressions.emit_c import INEXACT, Made, Value
 from neurovis_spec.language.expressions.parser import formula
-from neurovis_spec.language.expressions.tree import Name
+from neurovis_spec.language.expressions.tree import Conditional, Name, Number, names
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Anew, Arrivals, Incoming
 from neurovis_spec.runtime.c_code import Place, plus, state_name, words_of
@@ -65,6 +66,7 @@ from neurovis_spec.runtime.stages import (
     formulas_of,
     given,
     taken_in_order,
+    unfolded,
 )
 
 #: What a state changes by in a substep of the length h, by its derivative f and j = ∂f/∂x.
@@ -93,10 +95,22 @@ class _Integration:
         self.method, self.substeps = self.plan.operation.method, self.plan.operation.substeps
         #: the flow states of a stage
         self.now = "fy" if "fy" in self.plan.parts else "fx"
-        self.varying = {one.key: one.varies for one in self.plan.states}
+        #: those that are 0 where members rest, and of which else a number says it
+        self.resting = {one.key: found for one in self.plan.states if (found := self.rest(one)) is not None}
+        self.varying = {one.key: one.varies and one.key not in self.resting for one in self.plan.states}
         #: what formulas of connections see at a stage
         self.sight = _StageSight(step.sight.ends, self.code, step.form, plan=self.plan)
         self.forming = Forming(self.sight, {one.number: one.signal for one in self.plan.contacts})
+
+    def rest(self, one: FlowState) -> tuple[Conditional, Conditional] | None:
+        """``FlowState.resting`` where the method looks at it, and numbers are all that it reads of what moves."""
+        if self.method not in _CHANGES or (found := one.resting) is None:
+            return None
+        let, parameters = one.part.slopes.let, self.code.parameters(one.use, "p")
+        read = unfolded(let, [found[1].otherwise]).names - {name for name, _ in let}
+        if not names(found[0].condition) <= {*one.use.parameters, *(state.name for state in one.use.definition.state)}:
+            return None
+        return found if all(isinstance(parameters.get(name), float) for name in read) else None
 
     def write(self) -> None:
         """All of it."""
@@ -301,6 +315,7 @@ class _Integration:
         for part in parts:
             if part.flows:
                 self.neurons(part, part.derivatives, partial(self.slope, part))
+                self.let_rest(part)
         for contacts in self.plan.contacts:
             if contacts.flows:
                 self.step.each(len(contacts.projection.members), {}, partial(self.joined, contacts))
@@ -445,9 +460,10 @@ class _Integration:
         through = self.through(part, place, known, functions) if isinstance(part, Part) else {}
         for name, tree in part.derivatives.trees:
             key = Key(use.owner, name)
-            slope, at = code.value(tree, known, functions), plus(self.plan.starts[key], place)
-            idle = self.idle(part, name, place)
-            if changes is not None:
+            idle, at = self.idle(part, name, place), plus(self.plan.starts[key], place)
+            slope = self.change_or_rest(key, use, place, known, functions)
+            slope = code.value(tree, known, functions) if slope is None else slope
+            if changes is not None and key not in self.resting:
                 own_slope = code.value(diagonal[name], known, functions)
                 if name in through:
                     own_slope = f"{code.text(code.let('n', own_slope))}{through[name]}"
@@ -462,6 +478,41 @@ class _Integration:
             if idle:
                 slope = f"{idle} ? {code.text(0.0)} : {code.text(slope)}"
             code.line(f"fk[{at}] = {code.text(slope)};")
+
+    def change_or_rest(
+        self, key: Key, use: Use, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]
+    ) -> Value | None:
+        """What a state that members hold at rest changes by: in a loop as if none did (``let_rest``). None of other
+        states."""
+        if key not in self.resting:
+            return None
+        code, (derivative, slope) = self.code, self.resting[key]
+        parts: dict[str, Value] = {"h": self.length(use.definition.per_second)}
+        parts["j"] = code.value(slope.otherwise, known, functions)
+        parts["f"] = code.let("n", code.value(derivative.otherwise, known, functions))
+        moved = code.value(formula(_CHANGES[self.method]), parts)
+        if not self.step.form.written_out:
+            return moved
+        chosen = Conditional(derivative.condition, Number(0.0), Name("it moves"))
+        return code.value(chosen, {**known, "it moves": code.text(moved)}, functions)
+
+    def let_rest(self, part: Part) -> None:
+        """What members that rest change by is 0: in a loop of its own, for compilers make vectors of a choice between
+        numbers that are there, and not of one with a division in it."""
+        owner = part.population.model.owner
+        held = [name for name in part.flows if Key(owner, name) in self.resting]
+        if not held or self.step.form.written_out:
+            return
+
+        def rest(place: Place, totals: Mapping[int, str]) -> None:
+            for name in held:
+                key = Key(owner, name)
+                at, (derivative, _) = plus(self.plan.starts[key], place), self.resting[key]
+                chosen = Conditional(derivative.condition, Number(0.0), Name("it moves"))
+                known = {**self.known(part, place), "it moves": f"fk[{at}]"}
+                self.code.line(f"fk[{at}] = {self.code.text(self.code.value(chosen, known))};")
+
+        self.step.each(len(part.population.members), {}, rest)
 
     def spread(self, part: Part, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]) -> None:
         """What the noise of the states of a neuron is multiplied by."""

@@ -28,7 +28,7 @@ from neurovis_spec.arrays import BoolArray, Indices, IntArray, width
 from neurovis_spec.compiler.flows import BY_SLOPE
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port, Use
-from neurovis_spec.language.expressions.tree import Name
+from neurovis_spec.language.expressions.tree import Conditional, Name, Number
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Incoming, Sent, incoming_of
 from neurovis_spec.runtime.lags import lags_of
@@ -96,6 +96,19 @@ class FlowState(NamedTuple):
         if isinstance(self.part, Part) and any(one.state == self.name for one in self.part.through):
             return True
         return not unfolded(let, [diagonal[self.name]]).names <= {*self.use.parameters, *dict(let)}
+
+    @property
+    def resting(self) -> tuple[Conditional, Conditional] | None:
+        """The derivative, and how much it changes with the state, where both are 0 under one condition, as of what is
+        held at rest."""
+        part = self.part
+        if isinstance(part, Part) and any(one.state == self.name for one in part.through):
+            return None
+        derivative, slope = (dict(one.trees).get(self.name) for one in (part.derivatives, part.slopes))
+        if not (isinstance(derivative, Conditional) and isinstance(slope, Conditional)):
+            return None
+        zero = all(isinstance(one.then, Number) and one.then.value == 0 for one in (derivative, slope))
+        return (derivative, slope) if zero and derivative.condition == slope.condition else None
 
 
 class Reaching(NamedTuple):

@@ -22,6 +22,9 @@ from neurovis_spec.runtime.events import Rows, rows_of, weights_stay
 from neurovis_spec.runtime.signals import SignalLayout
 from neurovis_spec.runtime.stages import taken_by
 
+#: rows that are looked at together (``nv_quiet``)
+_AT_ONCE = 16
+
 
 @dataclass(frozen=True)
 class Firing:
@@ -46,6 +49,7 @@ class Firing:
         if remembered and rows.delays.any():
             with self._each_delay(rows):
                 sent = f"h[{code.at(rows.ends, 'r')}]"
+                self._pass_over(rows, "h")
                 code.line(f"if ({sent} == 0)")
                 code.line("    continue;")
                 yield "ago", "r", sent
@@ -63,9 +67,25 @@ class Firing:
         code = self.code
         with self._each_delay(rows):
             now = taken_at(self.ends.network, code, rows.ends, "r")
+            if now.startswith("activity["):
+                self._pass_over(rows, "h", "activity")
             code.line(f"if ({now} == 0 && h[{code.at(rows.ends, 'r')}] == 0)")
             code.line("    continue;")
             yield now
+
+    def _pass_over(self, rows: Rows, *arrays: str) -> None:
+        """Lines that pass over many rows at once of which nothing has fired, as most of them, in loops over the rows of
+        a delay."""
+        code = self.code
+        first, count = int(rows.ends[0]), len(rows.ends)
+        if count < _AT_ONCE or not np.array_equal(rows.ends, np.arange(first, first + count)):
+            return
+        stop = f"{code.tables.name(rows.firsts)}[d + 1]"
+        quiet = (f"nv_quiet({array} + {code.at(rows.ends, 'r')})" for array in arrays)
+        code.line(f"if (r + {_AT_ONCE} <= {stop} && {' && '.join(quiet)}) {{")
+        code.line(f"    r += {_AT_ONCE - 1};")
+        code.line("    continue;")
+        code.line("}")
 
     @contextmanager
     def _each_delay(self, rows: Rows) -> Iterator[None]:

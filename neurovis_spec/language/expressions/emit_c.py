@@ -57,6 +57,14 @@ _OF_OPERATORS: Final = {
 {{
     return x * x;
 }}""",
+    # whether 16 numbers are all 0, whatever their signs
+    "nv_quiet": """static int nv_quiet(const {real} *values)
+{{
+    int count = 0;
+    for (int i = 0; i < 16; i++)
+        count += values[i] != 0.0{s};
+    return !count;
+}}""",
     # of a ring of slots, that of so many steps before now, or of one more where q is below 0; and the next one
     "nv_slot": """static int32_t nv_slot(int32_t now, int32_t ago, int32_t length, {real} q)
 {{
