@@ -6,6 +6,7 @@ import ctypes
 import shutil
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 
 import numpy as np
@@ -97,7 +98,7 @@ class Controller:
             np.float64
         )
 
-    def fired(self) -> set[int]:
+    def fired(self) -> AbstractSet[int]:
         """The neurons that have fired in the last step."""
         mask = (ctypes.c_ubyte * self.neurons)(*([7] * self.neurons))
         count = self._call("fired")(ctypes.addressof(self.memory), ctypes.addressof(mask))

@@ -45,15 +45,24 @@ MODELS: dict[str, Plain] = {
             "u": {"initial": 0.2, "each_step": "keep*u + drive + 0.05*gain - 0.3*spike", "jump": "kick/2 + 2*kick*c"},
             "c": {"each_step": "0.5*c", "each_episode": "c/2"},
         },
-        "spike": {"when": "f(u) > 0.5", "set": {"u": "u - 0.4", "c": "c + u"}, "refractory": "rest + 0.001*c", "hold": ["u", "c"]},
+        "spike": {
+            "when": "f(u) > 0.5",
+            "set": {"u": "u - 0.4", "c": "c + u"},
+            "refractory": "rest + 0.001*c",
+            "hold": ["u", "c"],
+        },
         "activity": "f(u) + 0.1*spike",
         "outputs": {"both": "u - c"},
         "send": "spike",
     },
     # two that never fire
-    "decay": {"ports": ["kick"], "state": {"g": {"initial": 0.3, "derivative": "0.2*drive - 300*g", "jump": "kick"}}, "activity": "f(g)"},
+    "decay": {
+        "ports": ["kick"],
+        "state": {"g": {"initial": 0.3, "derivative": "0.2*drive - 300*g", "jump": "kick"}},
+        "activity": "f(g)",
+    },
     "hop": {"ports": ["kick"], "state": {"p": {"jump": "kick", "each_step": "0.5*p + 0.1*drive"}}, "activity": "p"},
-}  # fmt: skip
+}
 #: what of each model can be sent, which of that is a spike or made of one
 SENT: dict[str, list[str]] = {
     "lif": ["", "", "spike", "v", "w", "rate", "current"],
@@ -64,8 +73,17 @@ SENT: dict[str, list[str]] = {
     "static": [""],
     "leaky_integrator": ["", "v"],
 }
-SPIKES = {("lif", ""), ("lif", "spike"), ("lif", "rate"), ("wave", ""), ("wave", "spike"), ("wave", "fired"),
-          ("map", ""), ("map", "spike"), ("map", "activity")}  # fmt: skip
+SPIKES = {
+    ("lif", ""),
+    ("lif", "spike"),
+    ("lif", "rate"),
+    ("wave", ""),
+    ("wave", "spike"),
+    ("wave", "fired"),
+    ("map", ""),
+    ("map", "spike"),
+    ("map", "activity"),
+}
 FIRING = ("lif", "wave", "map")
 PORTS: dict[str, list[Plain]] = {
     "lif": ["drive", "kick", "kick", {"drive": 0.5, "kick": -0.3}],
@@ -90,8 +108,19 @@ READ: dict[str, list[str]] = {
 }
 #: what reads X of its source and Y of its target; of those that wait for spikes and of those that do not
 WAITING: list[dict[str, Plain]] = [
-    {"time": "ms", "parameters": {"tau": 3}, "state": {"g": {"derivative": "-g/tau", "on_pre": "g + weight"}}, "signal": "g*(1.5 - post.Y)"},
-    {"state": {"g": {"each_step": "0.7*g", "on_pre": "g + weight*(1 - 0.1*post.Y)"}, "c": {"on_pre": "c + 1", "each_episode": "c/4"}}, "signal": "g + 0.01*c"},
+    {
+        "time": "ms",
+        "parameters": {"tau": 3},
+        "state": {"g": {"derivative": "-g/tau", "on_pre": "g + weight"}},
+        "signal": "g*(1.5 - post.Y)",
+    },
+    {
+        "state": {
+            "g": {"each_step": "0.7*g", "on_pre": "g + weight*(1 - 0.1*post.Y)"},
+            "c": {"on_pre": "c + 1", "each_episode": "c/4"},
+        },
+        "signal": "g + 0.01*c",
+    },
     {
         "time": "ms",
         "parameters": {"U": 0.5, "rec": 8},
@@ -104,7 +133,7 @@ WAITING: list[dict[str, Plain]] = [
         "signal": "weight*released",
     },
     {"state": {"q": {"on_pre": "q + sent"}}, "signal": "weight*q*pre.X*0.1"},
-]  # fmt: skip
+]
 #: whose signal is a spike: to no port that a derivative reads
 INSTANT: list[dict[str, Plain]] = [
     {"state": {"r": {"initial": 1, "on_pre": "0.5*r", "each_step": "r + 0.1*(1 - r)"}}, "signal": "weight*r*spike"},
@@ -126,13 +155,29 @@ RULES: dict[str, dict[str, Plain]] = {
     },
     "pre": {
         "state": {"n": {"on_pre": "n + 1", "each_step": "0.8*n", "each_episode": "n/2"}},
-        "weight": {"on_pre": "weight*0.9 + 0.01*pre.X", "each_step": "weight + 0.01*n*spike", "each_episode": "0.95*weight"},
+        "weight": {
+            "on_pre": "weight*0.9 + 0.01*pre.X",
+            "each_step": "weight + 0.01*n*spike",
+            "each_episode": "0.95*weight",
+        },
     },
-    "post": {"parameters": {"up": 0.05}, "state": {"m": {"initial": 0.1, "on_post": "m + up*post.Y"}}, "weight": {"on_post": "weight - 0.1*m"}},
-    "drift": {"time": "ms", "state": {"l": {"derivative": "0.1*(pre.X - l)"}}, "weight": {"on_pre": "weight + 0.1*l", "derivative": "-0.01*weight + 0.001*l"}},
+    "post": {
+        "parameters": {"up": 0.05},
+        "state": {"m": {"initial": 0.1, "on_post": "m + up*post.Y"}},
+        "weight": {"on_post": "weight - 0.1*m"},
+    },
+    "drift": {
+        "time": "ms",
+        "state": {"l": {"derivative": "0.1*(pre.X - l)"}},
+        "weight": {"on_pre": "weight + 0.1*l", "derivative": "-0.01*weight + 0.001*l"},
+    },
     "slow": {"signals": ["by"], "weight": {"each_step": "weight - 0.02*weight*by"}},
-    "told": {"signals": ["by"], "state": {"told": {"on_pre": "0.5*told + by"}}, "weight": {"on_post": "weight + 0.1*told"}},
-}  # fmt: skip
+    "told": {
+        "signals": ["by"],
+        "state": {"told": {"on_pre": "0.5*told + by"}},
+        "weight": {"on_post": "weight + 0.1*told"},
+    },
+}
 DELAYS: list[Plain] = [
     None,
     None,
@@ -168,7 +213,7 @@ def made_spec(chooser: random.Random, groups: int, most: int = 3) -> Spec:
             if chooser.random() < 0.7:
                 body = _connection(chooser, kinds[source], kinds[target], used, i < j, [*sizes.items()])
                 if sizes[source] > 1 or sizes[target] > 1:
-                    drawn = ["all_to_all", {"random": {"probability": 0.7}}]
+                    drawn: list[Plain] = ["all_to_all", {"random": {"probability": 0.7}}]
                     body["pattern"] = chooser.choice(drawn if sizes[source] * sizes[target] > 5 else drawn[:1])
                 connections[f"{source} -> {target}"] = body
     return {
@@ -177,7 +222,10 @@ def made_spec(chooser: random.Random, groups: int, most: int = 3) -> Spec:
         "seed": chooser.randrange(100),
         "time": {
             "dt": 0.001,
-            "integrate": {"method": chooser.choice(["euler", "heun", "rk4", "semi_implicit"]), "substeps": chooser.choice([1, 1, 2])},
+            "integrate": {
+                "method": chooser.choice(["euler", "heun", "rk4", "semi_implicit"]),
+                "substeps": chooser.choice([1, 1, 2]),
+            },
             **({"episode": 5} if chooser.random() < 0.4 else {}),
         },
         "parameters": {"level": 1.6, "w": 0.6},
@@ -191,7 +239,7 @@ def made_spec(chooser: random.Random, groups: int, most: int = 3) -> Spec:
         "neurons": {name: _group(chooser, kind, sizes[name]) for name, kind in kinds.items()},
         "connections": connections,
         "events": _events(chooser, kinds, connections),
-    }  # fmt: skip
+    }
 
 
 class _Used:
@@ -202,8 +250,9 @@ class _Used:
 
 
 def _group(chooser: random.Random, kind: str, size: int) -> Plain:
+    settled: Plain = {kind: {"leak": 0.3}}
     group: dict[str, Plain] = {
-        "model": {kind: {"leak": 0.3}} if kind == "leaky_integrator" else kind,
+        "model": settled if kind == "leaky_integrator" else kind,
         "activation": chooser.choice(["identity", {"clip": {"low": -0.9, "high": 0.8}}]),
         "bias": chooser.choice([0.3, 1.4, 2.5, "level"]),
     }
@@ -247,7 +296,7 @@ def _connection(
     if names:
         body["plasticity"] = [_rule(chooser, name, source, target, used, sizes) for name in names]
         if chooser.random() < 0.4:
-            body["bounds"] = [-1.2, 1.1]
+            body["bounds"] = [-1.8, 1.8]
     return body
 
 
@@ -285,6 +334,11 @@ def _named(there: dict[str, Plain], made: Plain) -> str:
     return name
 
 
+def _taken_out(connections: dict[str, Plain]) -> list[Plain]:
+    first: list[Plain] = [*islice(connections, 1)]
+    return [{"at": 2, "lesion": first}, {"at": 7, "mend": first}] if first else []
+
+
 def _events(chooser: random.Random, kinds: dict[str, str], connections: dict[str, Plain]) -> list[Plain]:
     first, last = kinds["Ga"], list(kinds)[-1]
     events: list[Plain] = [
@@ -293,7 +347,7 @@ def _events(chooser: random.Random, kinds: dict[str, str], connections: dict[str
         {"from": 8, "to": 10, "clamp": {f"Ga.{_STATES[first]}": 1.2}},
         {"at": 6, "lesion": [last]},
         {"at": 9, "mend": [last]},
-        *({"at": at, what: [one]} for one in islice(connections, 1) for at, what in ((2, "lesion"), (7, "mend"))),
+        *_taken_out(connections),
     ]
     for name, body in connections.items():
         if isinstance(body, dict) and "plasticity" in body:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, FloatColumn, IntArray, IntColumn, frozen, pieces
+from neurovis_spec.arrays import BoolArray, FloatArray, FloatColumn, IntArray, IntColumn, frozen, pieces
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.events.changes import Change
@@ -600,6 +600,14 @@ class Network:
                 there = np.isin(members, holder.members)
                 result[there] = start + np.searchsorted(holder.members, members[there])
         return result
+
+    @cached_property
+    def spiking(self) -> BoolArray:
+        """For each neuron whether its activity is a spike."""
+        found = np.zeros(len(self.neurons), dtype=np.bool_)
+        for population in self.populations:
+            found[population.members] = is_spike(population.model.definition, MODEL.gives)
+        return frozen(found)
 
     @cached_property
     def clampable_of_neurons(self) -> int:

@@ -459,7 +459,10 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             with code.block(f"if (state->phase == {number})" if switch else ""):
                 for clamp in sorted(set(order[order >= 0].tolist())):
                     value = code.text(formula(code, phase.clamps[clamp].value, 0))
-                    self._hold_at(code, np.flatnonzero(order == clamp), value)
+                    held, fires = order == clamp, np.zeros(len(order), dtype=np.bool_)
+                    fires[: len(self.network.spiking)] = self.network.spiking
+                    self._hold_at(code, np.flatnonzero(held & ~fires), value)
+                    self._hold_at(code, np.flatnonzero(held & fires), f"({value}) != 0")
                 if phase.lesioned.any():
                     self._hold_at(code, np.flatnonzero(phase.lesioned), code.text(0.0))
                     if self.marks_lesioned:
@@ -468,7 +471,9 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         return self._function(code, "What neurons are held at.", "void nv_hold", self._pointer_lines())
 
     def _hold_at(self, code: Code, neurons: IntArray, value: str) -> None:
-        """The lines that hold some neurons at a value."""
+        """The lines that hold some neurons at a value, if there are any."""
+        if not len(neurons):
+            return
         name = code.variable("n", value)
         with code.block(code.loop("i", len(neurons))):
             neuron = code.at(neurons, "i")

@@ -13,15 +13,14 @@ import numpy as np
 from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.flows import is_spike
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import MODEL, Port
+from neurovis_spec.compiler.program import Port
 
 
 def are_spikes(network: Network) -> BoolArray:
     """For the activities of all neurons and the outlets behind them whether they are spikes."""
     n = len(network.neurons)
     found = np.zeros(n + network.outlet_count, dtype=np.bool_)
-    for population in network.populations:
-        found[population.members] = is_spike(population.model.definition, MODEL.gives)
+    found[:n] = network.spiking
     for one in network.outlets:
         population = network.populations[one.population]
         start = n + one.start

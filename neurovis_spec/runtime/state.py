@@ -133,7 +133,7 @@ def first_conditions(network: Network) -> Conditions:
         parameters=settable.parameters.copy(),
         was_set=np.zeros(len(settable.slots), dtype=np.bool_),
         variables=settable.initial.copy(),
-        held=Held.none(network.clampable),
+        held=Held.none(network.clampable, network.spiking),
         lesioned_neurons=np.zeros(n, dtype=np.bool_),
         lesioned_connections=np.zeros(m, dtype=np.bool_),
         paused=np.zeros(m, dtype=np.bool_),

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.arrays import BoolArray, FloatArray, IntArray, frozen
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 
@@ -52,21 +52,24 @@ class Change(NamedTuple):
 @dataclass
 class Held:
     """The clamps that hold at a step: ``order`` is that of the clamp which holds a neuron or a state, −1 where none
-    does, and ``value`` what it is held at, both for all that can be clamped, neurons first. ``active`` are all that
-    have not ended, by their order. What a formula says is computed ``by`` a library."""
+    does, and ``value`` what it is held at, both for all that can be clamped, neurons first. An activity that is a
+    spike (``spiking``) is held at 1 where it is not 0. ``active`` are all that have not ended, by their order. What a
+    formula says is computed ``by`` a library."""
 
     order: IntArray
     value: FloatArray
     active: dict[int, Clamp]
+    spiking: BoolArray
 
     @classmethod
-    def none(cls, count: int) -> Held:
-        """No clamp, of so many neurons and states."""
-        return cls(np.full(count, -1, dtype=np.int64), np.zeros(count), {})
+    def none(cls, count: int, spiking: BoolArray) -> Held:
+        """No clamp, of so many neurons and states. ``spiking`` says of each neuron whether its activity is a spike."""
+        states = np.zeros(count - len(spiking), dtype=np.bool_)
+        return cls(np.full(count, -1, dtype=np.int64), np.zeros(count), {}, np.concatenate((spiking, states)))
 
     def copy(self) -> Held:
         """The same, of its own."""
-        return Held(self.order.copy(), self.value.copy(), dict(self.active))
+        return Held(self.order.copy(), self.value.copy(), dict(self.active), self.spiking)
 
     def begin(self, clamp: Clamp, parameters: FloatArray, by: Library = NUMPY) -> None:
         """A clamp holds from now on, with these parameters."""
@@ -76,7 +79,12 @@ class Held:
     def _hold(self, clamp: Clamp, neurons: IntArray, parameters: FloatArray, by: Library) -> None:
         own = neurons[self.order[neurons] < clamp.order]
         self.order[own] = clamp.order
-        self.value[own] = clamp.value.values(parameters, by)
+        self._put(own, clamp, parameters, by)
+
+    def _put(self, which: IntArray, clamp: Clamp, parameters: FloatArray, by: Library) -> None:
+        """What a clamp says now, into some values; one that is not finite, which is reported, stays."""
+        value = clamp.value.values(parameters, by)
+        self.value[which] = np.where(self.spiking[which] & np.isfinite(value), value != 0, value)
 
     def end(self, events: Collection[int], parameters: FloatArray, by: Library = NUMPY) -> None:
         """The clamps of these events end; those of other events that they have covered hold again."""
@@ -108,4 +116,4 @@ class Held:
             return
         for order, clamp in self.active.items():
             if not clamp.value.slots.isdisjoint(changed):
-                self.value[self.order == order] = clamp.value.values(parameters, by)
+                self._put(np.flatnonzero(self.order == order), clamp, parameters, by)

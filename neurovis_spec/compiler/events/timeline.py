@@ -160,7 +160,7 @@ class _TrialRun:
         self._was_set = np.zeros(len(settable.slots), dtype=np.bool_)
         self._weights = self.network.connections.weights.whole().copy()
         self._variables = settable.initial.copy()
-        self._held = Held.none(self.network.clampable)
+        self._held = Held.none(self.network.clampable, self.network.spiking)
         self._arrays: dict[tuple[Binding, ...], tuple[_WrittenArray, ...]] = {}
         self._read_in_run = self._slots_read_in_run()
         # without those of instances, which follow; by name, as the hash depends on no order of the spec

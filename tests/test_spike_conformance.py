@@ -1,0 +1,151 @@
+"""What spikes, in every backend: each step as the reference makes it, in networks of any make."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import Phase, assume, given, settings
+from random_specs import Spec
+from random_spikes import spiking_specs
+
+import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.diagnostics import SpecError
+from neurovis_spec.runtime import c_backend
+from neurovis_spec.runtime.backend import Backend
+from neurovis_spec.runtime.c_backend import CBackend
+from neurovis_spec.runtime.columns import Keep
+from neurovis_spec.runtime.controls import Controls
+from neurovis_spec.runtime.course import Course
+from neurovis_spec.runtime.inputs import InputReader
+from neurovis_spec.runtime.numpy_backend import NumpyBackend
+from neurovis_spec.runtime.record import record
+from neurovis_spec.runtime.reference import ReferenceBackend
+from neurovis_spec.runtime.state import State, initial_state
+
+BACKENDS = ["numpy", pytest.param("c", marks=pytest.mark.compiler)]
+
+
+def compiled(spec: Spec) -> Network:
+    """The network of a spec, unless connections without delay form a cycle in it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return nv.compile(spec).network
+    except SpecError as error:
+        assume(all(one.code not in ("delay-0-cycle", "algebraic-loop") for one in error.diagnostics))
+        raise
+
+
+def arrays(state: State) -> dict[str, FloatArray]:
+    """All numbers of a state, by what they are."""
+    cells = {f"{owner}.{name}": values for owner, own in state.cells.items() for name, values in own.items()}
+    return {
+        "activity": state.activity, "outlets": state.outlets, "weights": state.weights, "signals": state.signals,
+        "history": state.history, **cells,
+    }  # fmt: skip
+
+
+def follow(network: Network, backend: Backend, steps: int = 14) -> int:
+    """Each step of a backend, begun in the reference's state, is that of the reference, with all events; but for the
+    sign of what is 0, since what does not fire is not visited. Gives how many fire."""
+    plain, other, reader = ReferenceBackend().prepare(network), backend.prepare(network), InputReader(network)
+    state, controls, fired = initial_state(network), Controls(network), 0
+    for k in range(steps):
+        controls.begin(state)
+        reader.use(state)
+        beside = state.copy()
+        plain.step(state, reader.at(k))
+        other.step(beside, reader.at(k))
+        for (name, expected), found in zip(arrays(state).items(), arrays(beside).values(), strict=True):
+            np.testing.assert_array_equal(found, expected, f"{name} at {k}")
+        fired += sum(int(own["spike"].sum()) for own in state.cells.values() if "spike" in own)
+    return fired
+
+
+@settings(max_examples=25, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=spiking_specs())
+def test_each_step_in_numpy_is_that_of_the_reference(spec: Spec) -> None:
+    follow(compiled(spec), NumpyBackend())
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("size", [0, 600], ids=["loops", "written out"])
+@settings(max_examples=6, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=spiking_specs(most=5))
+def test_each_step_in_c_is_that_of_the_reference(spec: Spec, size: int) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(c_backend, "SMALL", size)
+        follow(compiled(spec), CBackend())
+
+
+LATE = """
+neurovis: 1
+name: late
+time: {dt: 1 ms}
+models:
+  cell:
+    time: ms
+    state: {v: {initial: 0.3, derivative: (1.5 + drive - v)/3}}
+    spike: {when: v >= 1, set: {v: 0}}
+rules:
+  seen:
+    state: {heard: {on_pre: heard + 1}, last: {on_pre: pre.v}, sum: {each_step: sum + spike}}
+    weight: {on_pre: weight + 0.01*pre.v}
+neurons: {A: {count: 2, model: cell, initial: {v: [0.3, 0.7]}}, B: {model: cell}}
+connections:
+  A -> B: {weight: 0.1, pattern: all_to_all, send: v, delay: {seconds: 0.0024 + 0.0003*i}, plasticity: seen}
+"""
+
+
+@pytest.mark.parametrize("backend", ["reference", *BACKENDS])
+@pytest.mark.parametrize("size", [0, 600])
+def test_a_spike_arrives_once_where_the_delay_is_continuous(
+    backend: str, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It lies on no line between two steps: delays of 2.4 and 2.7 steps are of 2 and 3 where a rule waits for it."""
+    monkeypatch.setattr(c_backend, "SMALL", size)
+    network = nv.compile_text(LATE).network
+    run = record(network, Course(12, backend=backend, keep=Keep(states=("all",))))
+    for name, delay in (("A1", 2), ("A2", 3)):
+        fired, v = run[name], run[f"{name}.v"]
+        heard = np.concatenate((np.zeros(delay), np.cumsum(fired)))[: len(fired)]
+        np.testing.assert_array_equal(run[f"({name} -> B).heard"], heard)
+        np.testing.assert_array_equal(run[f"({name} -> B).sum"], heard)
+        step = int(np.flatnonzero(fired)[0]) + delay
+        assert run[f"({name} -> B).last"][step] == v[step - delay]
+
+
+MIXED = """
+neurovis: 1
+name: mixed
+time: {dt: 1 ms}
+models:
+  cell:
+    time: ms
+    ports: [kick]
+    state: {v: {initial: 0, derivative: (drive - v)/7, jump: kick}}
+    spike: {when: v >= 1, set: {v: 0}, refractory: 2, hold: v}
+rules:
+  trade: {state: {a: {on_pre: 0.5*a + 0.1, on_post: 0.9*a}}, weight: {on_pre: weight - 0.1*a, on_post: weight + a}}
+neurons: {E: {count: 60, model: cell, bias: "uniform(0.8, 2)", initial: {v: "uniform(0, 1)"}}}
+connections:
+  E -> E: {weight: "normal(0, 0.3)", pattern: {random: {probability: 0.4}}, port: kick, delay: DELAY, REST}
+events: [{at: 4, lesion: [E7..E9]}, {at: 11, mend: [E7..E9]}, {from: 6, to: 9, clamp: {E3: 1, E4: 0}}]
+"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("rest", ["self: true", "plasticity: trade, bounds: [-1.5, 1.5]"])
+@pytest.mark.parametrize("delay", ["0", "1", "1 + (i + 5*j) % 4"], ids=["now", "next", "mixed"])
+def test_sums_of_many_spikes_are_in_the_order_of_the_connections(backend: str, rest: str, delay: str) -> None:
+    """Also where what fired brings them in another order, as with delays that differ."""
+    network = nv.compile_text(MIXED.replace("DELAY", f'"{delay}"').replace("REST", rest)).network
+    runs = [record(network, Course(40, backend=one, keep=Keep(states=("all",)))) for one in ("reference", backend)]
+    assert runs[0].activity.sum() > 200
+    np.testing.assert_array_equal(runs[1].activity, runs[0].activity)
+    np.testing.assert_array_equal(runs[1].states, runs[0].states)
+    np.testing.assert_array_equal(runs[1].weights, runs[0].weights)
