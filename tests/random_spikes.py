@@ -251,9 +251,10 @@ class _Used:
 
 def _group(chooser: random.Random, kind: str, size: int) -> Plain:
     settled: Plain = {kind: {"leak": 0.3}}
+    activations: list[Plain] = ["identity", {"clip": {"low": -0.9, "high": 0.8}}]
     group: dict[str, Plain] = {
         "model": settled if kind == "leaky_integrator" else kind,
-        "activation": chooser.choice(["identity", {"clip": {"low": -0.9, "high": 0.8}}]),
+        "activation": chooser.choice(activations),
         "bias": chooser.choice([0.3, 1.4, 2.5, "level"]),
     }
     if size > 1:
