@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import neurovis_spec as nv
+from neurovis_spec.cli.overview import overview
 from neurovis_spec.runtime.columns import Keep
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.record import record
@@ -182,3 +183,32 @@ def test_a_step_is_what_the_contract_says(case: Case) -> None:
     np.testing.assert_array_equal(np.stack([run[f"N{i}.v"] for i in range(len(case.cells))], axis=1), voltages)
     if any(one.learns for one in case.joined):
         np.testing.assert_array_equal(run.weights, weights)
+
+
+def test_inspect_says_when_a_spike_counts() -> None:
+    """A spike that arrives makes its target jump before the threshold; one of the same step behind all, and so do
+    synapses and rules that wait for it."""
+    compiled = nv.compile_text("""
+neurovis: 1
+name: order
+time: {dt: 0.1 ms}
+models:
+  cell:
+    time: ms
+    ports: [kicks]
+    state: {v: {derivative: (drive - v)/20, jump: kicks}}
+    spike: {when: v >= 1, set: {v: 0}}
+synapses: {slow: {time: ms, state: {g: {derivative: -g/5, on_pre: g + weight}}, signal: g*(3 - post.v)}}
+rules: {timing: {weight: {on_pre: weight + 0.01, on_post: weight - 0.01}}}
+neurons: {A: {model: cell, bias: 2}, B: {model: cell}}
+connections:
+  A -> B: {weight: 0.1, port: kicks, plasticity: timing}
+  B -> A: {weight: 0.2, port: kicks, delay: 0}
+  A -> A: {weight: 0.1, synapse: slow}
+""")
+    shown = [" ".join(line.split()) for line in overview(compiled).splitlines()]
+    order = ["integrate A B v (rk4)", "on_pre A -> A g", "jump A B v", "fire A B v, spike", "update A B"]
+    order += ["jump, behind all spikes A B v", "on_pre A -> B weight", "on_post A -> B weight"]
+    assert [line for line in shown if line in order] == order
+    assert "spikes that arrive before the threshold is tested A -> B, A -> A" in shown
+    assert "spikes that act behind all of their step B -> A" in shown

@@ -7,7 +7,8 @@ of a small network (Eq. 11), the choices made and the hash.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -16,10 +17,14 @@ from neurovis_spec.cli.tables import number, spread, table
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE
 from neurovis_spec.compiler.program import (
+    PHASES,
+    SYNAPSE,
+    Advance,
     Definition,
     Diffuse,
     Hidden,
     Integrate,
+    Learn,
     Operation,
     Receive,
     SendAhead,
@@ -27,6 +32,8 @@ from neurovis_spec.compiler.program import (
 )
 from neurovis_spec.describe import wired
 from neurovis_spec.diagnostics import printable
+from neurovis_spec.runtime.events import are_spikes
+from neurovis_spec.runtime.stages import acts_now, taken_by
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import IntArray
@@ -194,17 +201,19 @@ def _port(of_route: tuple[str, float]) -> str:
 def _program(network: Network) -> str:
     """The order of a step where states flow, or synapses have states: what is integrated together, and what of it is
     held."""
-    if network.integration is None and not any(isinstance(one, Receive) for one in network.program):
+    if network.integration is None and not any(isinstance(one, Receive | Advance) for one in network.program):
         return ""
     rows = [row for operation in network.program for row in _rows(network, operation)]
     reached: dict[str, set[str]] = {}
     for one in () if network.integration is None else network.integration.populations:
         for name, how in _into_derivatives(network, one):
             reached.setdefault(how, set()).add(name)
+    for name, how in _spikes(network):
+        reached.setdefault(how, set()).add(name)
     reached["delay 0 by default"] = {network.connections.entries[entry] for entry in network.connections.undelayed}
     told = [
         (how, ", ".join(name for name in network.connections.entries if name in reached[how]))
-        for how in (_ANEW, _FORMED, _BETWEEN, _HELD, "delay 0 by default")
+        for how in (_ANEW, _FORMED, _BETWEEN, _HELD, _BEFORE, _BEHIND, "delay 0 by default")
         if reached.get(how)
     ]
     return "\n".join(["program", table(rows), *([table(told)] if told else [])])
@@ -215,6 +224,12 @@ def _rows(network: Network, operation: Operation) -> Iterator[tuple[str, str, st
     match operation:
         case Update(population=one):
             yield "update", _members(network, one), ""
+        case Advance(population=one, phase=phase):
+            changing = _changed(network.populations[one].model.definition.during([phase]))
+            yield _PHASES.get(phase, phase), _members(network, one), changing
+        case Learn(projection=one, phases=phases) if phases != PHASES:
+            projection = network.projections[one].during(phases)
+            yield ", ".join(phases), _connected(network, one), _changed(projection.use.definition)
         case Integrate(populations=several, method=method, substeps=substeps, projections=connected):
             how = method + (f", {count(substeps, 'substep')} a step" if substeps > 1 else "")
             for one in several:
@@ -222,16 +237,36 @@ def _rows(network: Network, operation: Operation) -> Iterator[tuple[str, str, st
             for one in connected:
                 yield "integrate", _connected(network, one), _flows(network.projections[one].use.definition, how)
         case Receive(projection=one, phases=phases):
-            states = network.projections[one].during(phases).use.definition.state
-            once = [one.name for one in states if one.stepped and not isinstance(one, Hidden)]
-            if once:
-                yield "receive", _connected(network, one), ", ".join(once)
+            if once := _changed(replace(network.projections[one].during(phases).use.definition, gives=())):
+                yield "on_pre" if "on_pre" in phases else "receive", _connected(network, one), once
         case SendAhead(population=one, names=names):
             yield "send ahead", _members(network, one), ", ".join(names)
         case Diffuse(populations=several):
             for one in several:
                 flows = network.populations[one].model.definition.flows
                 yield "noise", _members(network, one), ", ".join(state.name for state in flows if state.noise)
+
+
+def _changed(made: Definition) -> str:
+    """The names of what changes once a step of a definition."""
+    changing = (one for one in (*made.state, *(made.gives if made.kind.lasting else ())) if not isinstance(one, Hidden))
+    return ", ".join(one.name for one in changing if one.stepped or (one in made.gives and one.derivative is not None))
+
+
+def _spikes(network: Network) -> Iterator[tuple[str, str]]:
+    """The entries that bring spikes, and when these count."""
+    spikes, names = are_spikes(network), network.connections.entries
+    for population in network.populations if spikes.any() else ():
+        for port in population.ports:
+            now = acts_now(port)
+            come = spikes[taken_by(network)[port.incoming]] & (network.synapses.numbers[port.incoming] < 0)
+            for how, some in ((_BEFORE, come & ~now), (_BEHIND, now)):
+                for entry in np.unique(network.connections.entry[port.incoming[some]]).tolist():
+                    yield names[entry], how
+    for one in network.projections:
+        if one.kind == SYNAPSE and one.use.definition.has("on_pre"):
+            for entry in np.unique(network.connections.entry[one.members]).tolist():
+                yield names[entry], _BEHIND if one.at_once else _BEFORE
 
 
 def _connected(network: Network, projection: int) -> str:
@@ -255,6 +290,11 @@ def _flows(definition: Definition, how: str) -> str:
     states = [state.name for state in definition.flows]
     return f"{', '.join(states)} ({how})" if states else "what it sends, at each stage"
 
+
+#: What phases of models are called that are not called by a key of the language.
+_PHASES: Final = {"jump_now": "jump, behind all spikes"}
+#: When spikes count.
+_BEFORE, _BEHIND = "spikes that arrive before the threshold is tested", "spikes that act behind all of their step"
 
 #: What becomes of what connections bring to derivatives.
 _ANEW, _FORMED, _BETWEEN, _HELD = (
