@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
-from neurovis_spec.compiler.program import SPIKE, Hidden, Quantity
+from neurovis_spec.compiler.program import SPIKE, Definition, Hidden, Quantity
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
@@ -23,6 +23,7 @@ from neurovis_spec.language.expressions.tree import (
     Number,
     Tree,
     Unary,
+    put,
 )
 
 #: Whether it may fire again as far as ``when`` goes, and one more than the steps for which it still rests.
@@ -51,6 +52,23 @@ class Spike:
 def when_of(let: Collection[tuple[str, Tree]]) -> Tree | None:
     """``when`` of a model, from its intermediate values; None where it has no spike block."""
     return next((tree.parts[0] for name, tree in let if name == FIRES), None)
+
+
+def when_after(model: Definition) -> Tree | None:
+    """``when`` of a model with what ``set`` makes of its states put in; None where it sets nothing, or has no spike
+    block."""
+    when = when_of(model.let)
+    put_in = {
+        one.name: tree.then
+        for one in model.state
+        for phase, tree in one.acts
+        if phase == "fire" and isinstance(tree, Conditional) and not isinstance(one, Hidden) and one.name != SPIKE
+    }
+    if when is None or not put_in:
+        return None
+    for name, tree in reversed([pair for pair in model.let if pair[0] != FIRES]):
+        when = put(when, {name: tree})
+    return put(when, put_in)
 
 
 def with_spike(states: tuple[Quantity, ...], spike: Spike) -> tuple[Quantity, ...]:
