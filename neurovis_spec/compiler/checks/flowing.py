@@ -26,7 +26,7 @@ from neurovis_spec.compiler.taken import Side, Wired, read_at, reads_past
 from neurovis_spec.compiler.values.spikes import when_after
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.derivative import as_derivative
-from neurovis_spec.language.expressions.evaluate import evaluate_array
+from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.library import StateModel
@@ -59,7 +59,7 @@ def _firing_once(compiled: Compiled, findings: Findings) -> None:
     for one in compiled.census.groups:
         model, choice = one.kind.model.definition, one.model.model
         again = when_after(model)
-        known = {**CONSTANTS, **one.kind.model.parameters}
+        known: dict[str, Value] = {**CONSTANTS, **one.kind.model.parameters}
         if again is None or names(again) - known.keys() or not np.any(evaluate_array(again, known)):
             continue
         span = one.model.source.span if choice is None else choice.name.span
@@ -67,7 +67,7 @@ def _firing_once(compiled: Compiled, findings: Findings) -> None:
             told.add(span)
             message = f"with these parameters 'when' of the model '{model.name}' still holds behind 'set'"
             hint = (
-                "a neuron fires once then, until 'when' has been false: let 'set' make it false, or say nothing there"
+                "a neuron fires once then, until 'when' has been false: let 'set' make it false, or leave it out"
             )
             findings.warning("unreachable-spike", span, message, hint)
 
