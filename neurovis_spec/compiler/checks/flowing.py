@@ -66,9 +66,7 @@ def _firing_once(compiled: Compiled, findings: Findings) -> None:
         if span not in told:
             told.add(span)
             message = f"with these parameters 'when' of the model '{model.name}' still holds behind 'set'"
-            hint = (
-                "a neuron fires once then, until 'when' has been false: let 'set' make it false, or leave it out"
-            )
+            hint = "a neuron fires once then, until 'when' has been false: let 'set' make it false, or leave it out"
             findings.warning("unreachable-spike", span, message, hint)
 
 
