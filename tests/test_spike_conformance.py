@@ -149,3 +149,28 @@ def test_sums_of_many_spikes_are_in_the_order_of_the_connections(backend: str, r
     np.testing.assert_array_equal(runs[1].activity, runs[0].activity)
     np.testing.assert_array_equal(runs[1].states, runs[0].states)
     np.testing.assert_array_equal(runs[1].weights, runs[0].weights)
+
+
+TWO_PORTS = """
+neurovis: 1
+name: two_ports
+time: {dt: 1 ms}
+models:
+  cell:
+    time: ms
+    ports: [near, far]
+    state: {v: {initial: 0.2, derivative: (drive - v)/5, jump: near - far/2}}
+    spike: {when: v >= 1, set: {v: 0}}
+neurons: {A: {count: 3, model: cell, bias: 1.3 + i/4}, B: {count: 3, model: cell, bias: 1.2}}
+connections:
+  - A -> B: {weight: 0.3 + j/10, pattern: all_to_all, port: near, delay: 1 + i % 2, plasticity: learns}
+  - A -> B: {weight: 0.2 + j/10, pattern: all_to_all, port: far, delay: 2 - i % 2, plasticity: learns}
+rules: {learns: {weight: {on_pre: 0.9*weight}}}
+"""
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("size", [0, 600], ids=["loops", "written out"])
+def test_spikes_of_several_delays_come_to_several_ports(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(c_backend, "SMALL", size)
+    assert follow(nv.compile_text(TWO_PORTS).network, CBackend(), steps=30) > 10

@@ -102,20 +102,21 @@ class Firing:
         connection, where they do not come in order."""
         code, starts = self.code, self.code.tables.name(rows.starts)
         code.line(f"memset({name}, 0, {arrivals.count}*sizeof({name}[0]));")
+        bits = code.name("b") if marks else ""  # several ports of a population may have some
         if marks:
-            code.line(f"unsigned char *const bits = (unsigned char *){marks};")
-            code.line(f"memset(bits, 0, {8 * -(-len(rows.order) // 64)});")
+            code.line(f"unsigned char *const {bits} = (unsigned char *){marks};")
+            code.line(f"memset({bits}, 0, {8 * -(-len(rows.order) // 64)});")
         with self.before(rows, bool(rows.delays.all())) as (ago, row, sent):
             head = code.loop("e", f"{starts}[{row} + 1]", f"{starts}[{row}]")
             with code.block(head):
                 if marks:
                     code.line(f"const int32_t q = {code.at(rows.order, 'e')};")
-                    code.line("bits[q >> 3] |= (unsigned char)(1 << (q & 7));")
+                    code.line(f"{bits}[q >> 3] |= (unsigned char)(1 << (q & 7));")
                 else:
                     total = f"{name}[{code.at(arrivals.slots[rows.order], 'e')}]"
                     arrivals.add_spike(total, "e", rows.order, sent, ago, self._weight(arrivals, rows))
         if marks:
-            self._add_marked(arrivals, rows, name)
+            self._add_marked(arrivals, rows, name, bits)
 
     def _weight(self, arrivals: Arrivals, rows: Rows) -> Value | None:
         """The weight of a connection in its row, where none of them changes in a run: one number where it is the same
@@ -129,21 +130,21 @@ class Firing:
             return self.code.number(of_row, "r")
         return self.code.number(weights, "e")
 
-    def _add_marked(self, arrivals: Arrivals, rows: Rows, name: str) -> None:
-        """The sums of the connections that are marked, in their order."""
+    def _add_marked(self, arrivals: Arrivals, rows: Rows, name: str, bits: str) -> None:
+        """The sums of the connections that are marked in ``bits``, in their order."""
         code, count, depth = self.code, len(rows.order), self.ends.depth
         ago, ends = (np.empty(count, dtype=np.int64) for _ in range(2))
         ago[rows.order] = np.repeat(rows.delays, np.diff(rows.starts[rows.firsts]))
         ends[rows.order] = np.repeat(rows.ends, np.diff(rows.starts))
         with code.block(code.loop("g", -(-count // 64))):
             code.line("uint64_t any;")
-            code.line("memcpy(&any, bits + 8*g, 8);")
+            code.line(f"memcpy(&any, {bits} + 8*g, 8);")
             code.line("if (!any)")
             code.line("    continue;")
             with code.block(code.loop("byte", "8*g + 8", "8*g")), code.block(code.loop("q", "8*byte + 8", "8*byte")):
-                code.line("if (!bits[byte])")
+                code.line(f"if (!{bits}[byte])")
                 code.line("    break;")
-                code.line("if (!(bits[byte] >> (q & 7) & 1))")
+                code.line(f"if (!({bits}[byte] >> (q & 7) & 1))")
                 code.line("    continue;")
                 sent, then = taken_at(self.ends.network, code, ends, "q"), ""
                 if rows.delays.any():
