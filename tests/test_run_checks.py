@@ -251,6 +251,67 @@ def one(tree: Tree, given: tuple[float, ...], known: dict[str, float] | None = N
     return value, undefined, not undefined
 
 
+SPIKING = """
+neurovis: 1
+name: spiking
+time: {dt: 1 ms, steps: 20}
+parameters: {zero: 0}
+models:
+  cell:
+    time: ms
+    parameters: {z: 0}
+    ports: [kick]
+    state: {v: {initial: 0.2, derivative: (drive - v)/5, jump: JUMP}}
+    spike: {when: WHEN, set: {v: SET}, refractory: 2, hold: v}
+    activity: ACTIVITY
+    send: spike
+synapses: {s: {parameters: {z: 0}, state: {g: {on_pre: SYNAPSE}}, signal: g}}
+rules: {r: {parameters: {z: 0}, weight: {on_pre: ARRIVES, on_post: FIRES}}}
+neurons: {A: {count: 2, model: {cell: {z: zero}}, bias: 2}, B: {count: 2, model: cell, bias: 1.5}, C: {}}
+connections:
+  A -> B: {weight: 0.1, port: kick, delay: DELAY, pattern: all_to_all, plasticity: {r: {z: zero}}}
+  A -> C: {synapse: {s: {z: zero}}, delay: 0, weight: 1}
+"""
+PLAIN = {
+    "JUMP": "kick",
+    "WHEN": "v >= 1",
+    "SET": "0",
+    "ACTIVITY": "spike",
+    "SYNAPSE": "g + weight",
+    "ARRIVES": "weight",
+    "FIRES": "weight",
+    "DELAY": "1",
+}
+HIDES = '"clip(1/z, 0, 1)"'
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({}, ""),
+        ({"JUMP": '"kick*clip(1/z, -1, 1)"'}, "the model 'cell' divides by 0 for A1 at step 1"),
+        ({"WHEN": "v >= 1 and 1/z > 0"}, "the model 'cell' divides by 0 for A1 at step 3"),
+        ({"SET": HIDES}, "the model 'cell' divides by 0 for A1 at step 3"),
+        ({"ACTIVITY": '"clip((1 + spike)/z, 0, 1)"'}, "the model 'cell' divides by 0 for A1 at step 1"),
+        ({"SYNAPSE": HIDES}, "the synapse 's' divides by 0 for A1 -> C after step 3"),
+        ({"ARRIVES": HIDES, "DELAY": "2"}, "the rule 'r' divides by 0 for A1 -> B1 after step 5"),
+        ({"FIRES": HIDES, "DELAY": "0"}, "the rule 'r' divides by 0 for A1 -> B1 after step 4"),
+    ],
+)
+def test_what_spikes_bring_about_is_looked_at_when_it_is_computed(
+    backend: str, changed: dict[str, str], message: str
+) -> None:
+    """Where a neuron jumps, where it fires, in its activity behind that, and at connections that wait for it alone."""
+    text = SPIKING
+    for name, formula in (PLAIN | changed).items():
+        text = text.replace(name, formula)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        nv.compile_text(text).run(backend=backend)
+    assert [str(one.message)[: len(message)] for one in told] == ([message] if message else [])
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_what_is_told_of_is_computed_and_hidden(seed: int) -> None:
     """Laws: where a hazard is told of, something undefined is computed; where something undefined is computed and none

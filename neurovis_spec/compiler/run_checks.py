@@ -8,6 +8,8 @@ is a formula like others, which every backend computes; most networks have none,
 ``drive/s`` for a setting that is not 0 and that nobody can set in a run.
 
 - A *hazard* is an operation that may be undefined, with a formula that is true where it is.
+- A check has a formula for each *phase* in which something may be undefined: where spikes bring about some of these,
+  what one has found stays, so that it is seen behind the step.
 - *Hidden* says what of a value is swallowed afterwards: NOTHING, INFINITY (a bound swallows that, but no NaN) or ALL.
 - What a definition *gives* is its result: a model's activity, a rule's weight. A result is *lasting* where it is kept
   from step to step, as all states and the weight are, and *fleeting* where it is computed anew from the new states, as
@@ -18,10 +20,11 @@ is a formula like others, which every backend computes; most networks have none,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 
@@ -29,12 +32,14 @@ from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.lower import receiving
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
+    PHASES,
     SYNAPSE,
     UNDEFINED_F,
     Check,
     Definition,
     Key,
     Operation,
+    Phase,
     Population,
     Projection,
     Quantity,
@@ -62,6 +67,9 @@ from neurovis_spec.language.expressions.undefined import (
     hazards,
     together,
 )
+
+#: The phases that come behind ``each_step``.
+_BEHIND: Final[frozenset[Phase]] = frozenset(("fire", "settle", "jump_now"))
 
 
 def with_checks(network: Network) -> Network:
@@ -118,15 +126,22 @@ class _Checks:
         activation = population.activation.definition
         checks, calls = self.of_use(population.model, functions=activation.functions)
         if calls and activation.given.each_step is not None:
-            inside = hazards(activation.given.each_step, max(call.hidden for call in calls)).found
+            inside = hazards(
+                activation.given.each_step, max(call.hidden for some in calls.values() for call in some)
+            ).found
             inside = _still_possible(inside, self.fixed(population.activation))
             if inside:
                 # The activation gets a second function, true where the first one is undefined; the check of the model
                 # calls it with the arguments with which the model calls the first one.
                 undefined = Quantity(UNDEFINED_F, either(hazard.formula for hazard in inside))
                 activation = replace(activation, gives=(*activation.gives, undefined))
-                at_calls = [Hazard(inside[0].what, Call(UNDEFINED_F, c.call.arguments), c.where) for c in calls]
-                check = _check(f"activation '{activation.name}'", _within_formula_limit(at_calls), [], {})
+                at_calls = {
+                    phase: _within_formula_limit(
+                        Hazard(inside[0].what, Call(UNDEFINED_F, one.call.arguments), one.where) for one in some
+                    )
+                    for phase, some in calls.items()
+                }
+                check = _check(f"activation '{activation.name}'", at_calls, {})
                 checks += () if check is None else (check,)
         if not checks:
             return population
@@ -149,34 +164,52 @@ class _Checks:
 
     def of_use(
         self, use: Use, hidden: Hidden = Hidden.NOTHING, functions: Mapping[str, Tree] = MappingProxyType({})
-    ) -> tuple[list[Check], list[Called]]:
-        """The checks of a definition, none or one, and which of the ``functions`` it calls. ``hidden``: how far its
-        result is swallowed afterwards. A state shows, unless an episode's end replaces it."""
+    ) -> tuple[list[Check], dict[Phase, list[Called]]]:
+        """The checks of a definition, none or one, and where it calls some of the ``functions``, by the phases before
+        an episode's end. ``hidden``: how far its result is swallowed afterwards. A state shows, unless an episode's end
+        replaces it."""
         definition = use.definition
-        each_step: list[Hazards] = []
-        each_episode: list[Hazards] = []
+        found: dict[Phase, list[Hazards]] = {"each_step": []}
+        end: Phase = "settle" if definition.fires else "each_step"
         for result in definition.fleeting:
             if result.each_step is not None:
-                each_step.append(_in_terms_of_old_states(hazards(result.each_step, functions=functions), definition))
+                made = hazards(result.each_step, functions=functions)
+                found.setdefault(end, []).append(
+                    made if definition.fires else _in_terms_of_old_states(made, definition)
+                )
         for quantity in (*definition.gives, *definition.state) if definition.kind.lasting else definition.state:
             degree = hidden if quantity in definition.gives else Hidden.NOTHING
-            is_replaced = self.network.episode is not None and quantity.each_episode is not None
-            if quantity.each_step is not None:
-                each_step.append(hazards(quantity.each_step, Hidden.ALL if is_replaced else degree, None, functions))
-            is_replaced |= quantity.each_step is not None
-            for flow in (quantity.derivative, quantity.noise):
-                if flow is not None:
-                    each_step.append(hazards(flow, Hidden.ALL if is_replaced else degree, None, functions))
-            if quantity.each_episode is not None:
-                each_episode.append(hazards(quantity.each_episode, degree))
-        at_step = through_let(each_step, definition.let, functions)
+            for phase, tree in _computed(quantity, end):
+                is_replaced = self._is_replaced(quantity, phase, tree)
+                made = hazards(tree, Hidden.ALL if is_replaced else degree, None, functions)
+                found.setdefault(phase, []).append(made)
+        through = {phase: through_let(some, definition.let, functions) for phase, some in found.items()}
         check = _check(
             f"{definition.kind.name} '{definition.name}'",
-            at_step.found,
-            through_let(each_episode, definition.let, functions).found,
+            {phase: some.found for phase, some in through.items()},
             self.fixed(use),
         )
-        return [] if check is None else [check], at_step.calls
+        through.pop("each_episode", None)
+        return [] if check is None else [check], {phase: some.calls for phase, some in through.items() if some.calls}
+
+    def _is_replaced(self, quantity: Quantity, phase: Phase, tree: Tree) -> bool:
+        """Whether what a formula makes of something in a phase may not be seen behind the step, as an episode's end or
+        a later formula makes something else of it."""
+        if phase == "each_episode":
+            return False
+        if self.network.episode is not None and quantity.each_episode is not None:
+            return True
+        return quantity.each_step is not None and tree is not quantity.each_step and phase not in _BEHIND
+
+
+def _computed(quantity: Quantity, end: Phase) -> Iterator[tuple[Phase, Tree]]:
+    """What a step computes of something, and in which phase that is looked at: derivatives at the ``end``."""
+    if quantity.each_step is not None:
+        yield "each_step", quantity.each_step
+    yield from ((end, flow) for flow in (quantity.derivative, quantity.noise) if flow is not None)
+    yield from quantity.acts
+    if quantity.each_episode is not None:
+        yield "each_episode", quantity.each_episode
 
 
 def _with_states(use: Use, states: list[Check]) -> Use:
@@ -249,18 +282,23 @@ def _still_possible(candidates: Iterable[Hazard], fixed: Mapping[str, Value]) ->
     return possible
 
 
-def _check(what: str, each_step: list[Hazard], each_episode: list[Hazard], fixed: Mapping[str, Value]) -> Check | None:
-    """The check of a definition, of what it computes at each step and at an episode's end; None if it needs none."""
-    at_step, at_end = _still_possible(each_step, fixed), _still_possible(each_episode, fixed)
-    if not at_step and not at_end:
+def _check(what: str, found: Mapping[Phase, list[Hazard]], fixed: Mapping[str, Value]) -> Check | None:
+    """The check of a definition, of what it computes in each phase; None if it needs none."""
+    possible = {phase: _still_possible(some, fixed) for phase, some in found.items()}
+    if not any(possible.values()):
         return None
-    kinds = {hazard.what for hazard in (*at_step, *at_end)}
+    kinds = {hazard.what for some in possible.values() for hazard in some}
     name = f"the {what} {kinds.pop() if len(kinds) == 1 else 'has an undefined operation'}"
-    step = _infinite_if_any(at_step, Number(0.0)) if at_step else Number(0.0)
-    # at an episode's end the state stays what the last step has made it, or becomes infinite
-    return Check(name, step, _infinite_if_any(at_end, Name(name)) if at_end else None)
+    # what an earlier phase has made of the state stays, or becomes infinite; the first of a step begins anew
+    made = {phase: _infinite_if_any(some, Name(name)) for phase, some in possible.items() if some}
+    acts = tuple((phase, tree) for phase, tree in made.items() if phase not in PHASES)
+    if not acts:
+        made["each_step"] = _infinite_if_any(possible.get("each_step", []), Number(0.0))
+    return Check(name, made.get("each_step"), made.get("each_episode"), acts=acts)
 
 
 def _infinite_if_any(possible: list[Hazard], otherwise: Tree) -> Tree:
     """∞ where one of the hazards is computed and undefined."""
+    if not possible:
+        return otherwise
     return Conditional(either(hazard.formula for hazard in possible), Number(math.inf), otherwise)
