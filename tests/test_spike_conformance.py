@@ -15,7 +15,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.runtime import c_backend
-from neurovis_spec.runtime.backend import Backend
+from neurovis_spec.runtime.backend import Backend, BackendError, Capabilities
 from neurovis_spec.runtime.c_backend import CBackend
 from neurovis_spec.runtime.columns import Keep
 from neurovis_spec.runtime.controls import Controls
@@ -24,6 +24,7 @@ from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.reference import ReferenceBackend
+from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State, initial_state
 
 BACKENDS = ["numpy", pytest.param("c", marks=pytest.mark.compiler)]
@@ -174,3 +175,15 @@ rules: {learns: {weight: {on_pre: 0.9*weight}}}
 def test_spikes_of_several_delays_come_to_several_ports(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(c_backend, "SMALL", size)
     assert follow(nv.compile_text(TWO_PORTS).network, CBackend(), steps=30) > 10
+
+
+def test_a_backend_without_spikes_refuses_them() -> None:
+    class Plain(NumpyBackend):
+        name = "plain"
+        capabilities = Capabilities(flows=True, synapses=True)
+
+    jumps = TWO_PORTS.replace("spike: {when: v >= 1, set: {v: 0}}", "activity: v").replace(", plasticity: learns", "")
+    jumps = jumps[: jumps.index("rules:")]
+    for text in (TWO_PORTS, jumps):
+        with pytest.raises(BackendError, match=r"'plain' cannot run 'two_ports': no spikes"):
+            Simulation(nv.compile_text(text).network, Plain())

@@ -131,7 +131,7 @@ def _learning(projections: tuple[Projection, ...]) -> Iterator[Operation]:
     """The rules of all connections. Where some have several, or spikes change something, a phase of all comes before
     the next, in the order in which connections have them."""
     rules = [number for number, one in enumerate(projections) if one.kind == RULE]
-    spiking = any(one.acts for number in rules for one in projections[number].use.definition.lasting)
+    spiking = any(projections[number].use.definition.acts for number in rules)
     if not spiking and not any(projections[number].place for number in rules):
         yield from map(Learn, rules)
         return

@@ -177,11 +177,16 @@ class Definition:
 
     def during(self, phases: Collection[Phase]) -> Definition:
         """The same with what is carried out of it in these phases."""
-        if set(phases) == set(PHASES) and not any(one.acts for one in (*self.gives, *self.state)):
+        if set(phases) == set(PHASES) and not self.acts:
             return self
         lasting = self.kind.lasting
         gives = tuple(one.during(phases) for one in self.gives) if lasting else self.gives
         return replace(self, gives=gives, state=tuple(one.during(phases) for one in self.state))
+
+    @property
+    def acts(self) -> frozenset[Phase]:
+        """The phases beside those of every step in which anything becomes of what it keeps or gives."""
+        return frozenset(phase for one in (*self.gives, *self.state) for phase, _ in one.acts)
 
     def has(self, phase: Phase) -> bool:
         """Whether anything that lasts changes in a phase."""
@@ -274,8 +279,7 @@ class Definition:
     @property
     def read(self) -> frozenset[str]:
         """All names that its formulas read in a run, and whether a spike has come, where that changes something."""
-        phases = {phase for one in (*self.state, *self.gives) for phase, _ in one.acts}
-        return frozenset(AT_SPIKE[phase] for phase in phases & AT_SPIKE.keys()).union(*map(names, self.formulas))
+        return frozenset(AT_SPIKE[phase] for phase in self.acts & AT_SPIKE.keys()).union(*map(names, self.formulas))
 
     @property
     def end_names(self) -> tuple[EndName, ...]:

@@ -49,6 +49,8 @@ class Capabilities:
     flows: bool = False
     #: synapses, their states and signals, and all that definitions of connections read of both ends
     synapses: bool = False
+    #: models that fire, jumps, and what of synapses and rules waits for spikes (``Definition.acts``)
+    spikes: bool = False
     #: clamps of states of models (``Conditions.fixed``)
     clamped_states: bool = False
     #: the most neurons and connections together, None without a bound
@@ -349,6 +351,7 @@ def lacking(network: Network, capabilities: Capabilities) -> tuple[str, ...]:
         ),
         (not capabilities.plasticity and any(one.kind == RULE for one in network.projections), "no plasticity"),
         (not capabilities.synapses and any(one.kind == SYNAPSE for one in network.projections), "no synapses"),
+        (not capabilities.spikes and any(use.definition.acts for _, use in network.uses), "no spikes"),
         (not capabilities.noise and bool(network.noises), "no noise"),
         (not capabilities.episodes and network.episode is not None, "no episodes"),
         *((not capabilities.flows and has, f"no {what}") for what, has in _beyond(network)),

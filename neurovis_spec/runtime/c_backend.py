@@ -583,7 +583,9 @@ class CBackend:
     """C made from the update program, compiled for this machine."""
 
     name = "c"
-    capabilities = Capabilities(noise=True, flows=True, synapses=True, clamped_states=True, exactness="bits")
+    capabilities = Capabilities(
+        noise=True, flows=True, synapses=True, spikes=True, clamped_states=True, exactness="bits"
+    )
 
     def availability(self) -> Availability:
         """Whether there is a compiler."""

@@ -68,7 +68,7 @@ class NumpyBackend:
     """Array code made from the update program."""
 
     name = "numpy"
-    capabilities = Capabilities(noise=True, flows=True, synapses=True, clamped_states=True)
+    capabilities = Capabilities(noise=True, flows=True, synapses=True, spikes=True, clamped_states=True)
 
     def availability(self) -> Availability:
         """Always there."""

@@ -57,7 +57,9 @@ class ReferenceBackend:
     """Executes anything, slowly."""
 
     name = "reference"
-    capabilities = Capabilities(noise=True, flows=True, synapses=True, clamped_states=True, exactness="bits")
+    capabilities = Capabilities(
+        noise=True, flows=True, synapses=True, spikes=True, clamped_states=True, exactness="bits"
+    )
 
     def availability(self) -> Availability:
         """Always there."""
