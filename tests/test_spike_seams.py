@@ -14,11 +14,13 @@ from hypothesis import strategies as st
 from random_spikes import spiking_specs
 
 import neurovis_spec as nv
+from neurovis_spec.arguments import CodedWarning
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.turns import Hold, Set, Turn
 from neurovis_spec.runtime import c_export
+from neurovis_spec.runtime.npz_file import read_npz
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State
 
@@ -299,3 +301,36 @@ connections: {left.E -> right.E: {weight: 0.3, port: kick, pattern: one_to_one}}
     table = nv.sweep(tmp_path / "swept.yaml", {"threshold": [0.8, 1.2]}, {"often": "rate(K, last=100)"}, jobs=1)
     first, second = (float(str(cell)) for cell in table["often"])
     assert first > second > 0
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
+def test_a_run_goes_on_from_a_recording_with_all_states(backend: str, tmp_path: Path) -> None:
+    """Who is armed, who rests, and what is under way, of what flows and of what does not; else it begins anew."""
+    text = """\
+neurovis: 1
+name: on
+time: {dt: 1 ms, steps: 40}
+models:
+  cell:
+    time: ms
+    ports: [kick]
+    state: {v: {derivative: (drive - v)/5, jump: kick}}
+    spike: {when: v >= 1, set: {v: 0}, refractory: 4, hold: v}
+  map: {state: {u: {each_step: 0.7*u + drive}}, spike: {when: u > 0.5}, activity: u, send: spike}
+neurons: {A: {count: 3, model: cell, bias: 1.5 + i/3}, B: {count: 2, model: map, bias: 0.2 - i/9}}
+connections:
+  A -> B: {weight: -0.9, pattern: all_to_all, delay: 3}
+  B -> A: {weight: 1, port: kick, pattern: all_to_all}
+"""
+    only_map = text.replace("A: {count: 3, model: cell, bias: 1.5 + i/3}, ", "")
+    for spec in (text, only_map[: only_map.index("connections")]):
+        network = nv.compile_text(spec)
+        whole = network.run(30, backend=backend, states="all")
+        for cut in (6, 13, 17):
+            network.run(cut, backend=backend, states="all").save(tmp_path / f"{cut}.npz")
+            first = read_npz(tmp_path / f"{cut}.npz")
+            rest = network.run(30 - cut, backend=backend, states="all", start=first)
+            np.testing.assert_array_equal(rest.states, whole.states[cut:])
+            np.testing.assert_array_equal(rest.activity, whole.activity[cut:])
+        with pytest.warns(CodedWarning, match=r"lacks states (with a derivative|of neurons that fire), as of [AB]1"):
+            network.run(3, backend=backend, start=network.run(5, backend=backend))

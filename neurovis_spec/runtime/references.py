@@ -17,7 +17,7 @@ from neurovis_spec.compiler.names.state_references import (
     model_state,
 )
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import MODEL, RULE, SYNAPSE, Hidden, Kind
+from neurovis_spec.compiler.program import MODEL, RULE, SYNAPSE, Check, Hidden, Kind
 from neurovis_spec.language.references import Arrow, Part, Sum, parse, parse_sum, state_of
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.likeness import suggest
@@ -88,12 +88,13 @@ def find_lasting_state(network: Network, reference: str) -> StateOf | None:
 
 
 def all_states(network: Network) -> tuple[StateOf, ...]:
-    """All that models and rules keep, outputs of models among it."""
+    """All that models and rules keep, outputs of models among it; and whether what fires is armed, and for how long it
+    rests, without which no run could go on from what is recorded."""
     return tuple(
         StateOf.of(use.definition.kind.each, one.name, holder.members)
         for holder, use in network.uses
         for one in use.definition.kept
-        if not isinstance(one, Hidden)
+        if not isinstance(one, Check)
     )
 
 

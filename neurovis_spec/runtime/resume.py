@@ -17,7 +17,7 @@ there those that the recording has (``--states all``) are taken, and what of the
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Holder, Key, Population, Use
+from neurovis_spec.compiler.program import Holder, Key, Population, Quantity, Use
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.controls import Controls, lose
@@ -60,7 +60,7 @@ def resumed_state(
     _lesion_again(network, recording, state, controls)
     depth = int(ring_lengths(network).max(initial=1))
     theirs, ours = _same_connections(network, recording)
-    kept = None if network.integration is None else _Kept(network, recording)
+    kept = _Kept(network, recording) if _goes_on(network) else None
     state.weights[learned] = recording.weights_after[columns]
 
     def weights_at(row: int) -> FloatArray:
@@ -128,9 +128,14 @@ def _last_rows(recording: Recording, depth: int) -> list[tuple[int, int]]:
     return rows
 
 
+def _goes_on(network: Network) -> bool:
+    """Whether states go on: something flows, or fires."""
+    return network.integration is not None or any(use.definition.fires for _, use in network.uses)
+
+
 class _Kept:
-    """The states that a recording has, of a network in which something flows; a warning says whose flow states it has
-    not, which begin anew."""
+    """The states that a recording has, of a network in which something flows or fires; a warning says whose flow states
+    it has not, or whose states of those that fire, which begin anew."""
 
     def __init__(self, network: Network, recording: Recording) -> None:
         self.network, self.states = network, recording.states
@@ -142,17 +147,23 @@ class _Kept:
                 columns = self._columns_of(holder, use, one.name)
                 if (columns >= 0).all():
                     self.found[Key(use.owner, one.name)] = columns
-        #: the populations and projections whose flow begins anew
-        self.anew = [
-            holder
-            for holder, use in network.uses
-            if not all(Key(use.owner, flow.name) in self.found for flow in use.definition.flows)
+        flowing = [one for one in network.uses if not self._has(one[1], one[1].definition.flows)]
+        firing = [
+            one for one in network.uses if one[1].definition.fires and not self._has(one[1], one[1].definition.state)
         ]
+        #: the populations and projections whose states begin anew
+        self.anew = [holder for holder, _ in (*flowing, *firing)]
         if self.anew:
-            flows = sorted({self._first_of(holder) for holder in self.anew})
-            message = f"the recording lacks states with a derivative, as of {flows[0]}, which begin anew: record them "
-            message += "(run --states all)"
+            first = min(self._first_of(holder) for holder, _ in flowing or firing)
+            what = "with a derivative" if flowing else "of neurons that fire"
+            message = (
+                f"the recording lacks states {what}, as of {first}, which begin anew: record them (run --states all)"
+            )
             warnings.warn(CodedWarning("states-begin-anew", message), stacklevel=callers_level())
+
+    def _has(self, use: Use, states: Sequence[Quantity]) -> bool:
+        """Whether the recording has all of these states of a definition in use."""
+        return all(Key(use.owner, one.name) in self.found for one in states)
 
     def _first_of(self, holder: Holder) -> str:
         """The name of the first member."""
