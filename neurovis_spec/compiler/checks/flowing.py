@@ -23,12 +23,8 @@ from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.program import SYNAPSE, Definition, EndName
 from neurovis_spec.compiler.stiffness import stiffest_at_begin
 from neurovis_spec.compiler.taken import Side, Wired, read_at, reads_past
-from neurovis_spec.compiler.values.spikes import when_after
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.derivative import as_derivative
-from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
-from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.library import StateModel
 from neurovis_spec.language.words import Method
 
@@ -40,7 +36,6 @@ _HIGHER: Final = frozenset(("heun", "rk4"))
 
 def check_flowing(compiled: Compiled, findings: Findings) -> None:
     """Warn of what makes an integration worse than it could be. Most specs have none."""
-    _firing_once(compiled, findings)
     by = compiled.network.integration
     if by is None:
         _nothing_flows(compiled, findings)
@@ -50,24 +45,6 @@ def check_flowing(compiled: Compiled, findings: Findings) -> None:
     _held_noise(compiled, findings)
     _steps_by_hand(compiled, by.method, findings)
     _stiff(compiled, findings)
-
-
-def _firing_once(compiled: Compiled, findings: Findings) -> None:
-    """Spikes behind which ``when`` still holds, by the parameters that a group gives its model: its neurons are not
-    armed again before something else makes that false."""
-    told = set[Span]()
-    for one in compiled.census.groups:
-        model, choice = one.kind.model.definition, one.model.model
-        again = when_after(model)
-        known: dict[str, Value] = {**CONSTANTS, **one.kind.model.parameters}
-        if again is None or names(again) - known.keys() or not np.any(evaluate_array(again, known)):
-            continue
-        span = one.model.source.span if choice is None else choice.name.span
-        if span not in told:
-            told.add(span)
-            message = f"with these parameters 'when' of the model '{model.name}' still holds behind 'set'"
-            hint = "a neuron fires once then, until 'when' has been false: let 'set' make it false, or leave it out"
-            findings.warning("unreachable-spike", span, message, hint)
 
 
 def _nothing_flows(compiled: Compiled, findings: Findings) -> None:

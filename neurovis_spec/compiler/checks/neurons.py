@@ -22,6 +22,7 @@ from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import beginning
 from neurovis_spec.compiler.program import DRIVE, SYNAPSE, Definition, Population
+from neurovis_spec.compiler.values.spikes import still_fires
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
@@ -38,6 +39,7 @@ _DRIVING = ("input", "bias", "noise", "combine")
 def check_neurons(compiled: Compiled, findings: Findings) -> None:
     """Warn of idle neurons, once for each group as it is written, and of what a model leaves out of account."""
     told = _warn_ignored(compiled, findings)
+    _warn_firing_once(compiled, findings)
     if any(event.clamp for event in compiled.spec.events):
         return  # what is clamped is active from outside
     _warn_idle(compiled, told, findings)
@@ -55,6 +57,20 @@ def _warn_ignored(compiled: Compiled, findings: Findings) -> set[Span]:
                 told.add(span)
                 findings.warning("no-effect", span, message, hint)
     return told
+
+
+def _warn_firing_once(compiled: Compiled, findings: Findings) -> None:
+    """Warn of spikes behind which ``when`` still holds, by the parameters that a group gives its model: its neurons are
+    not armed again before something else makes that false."""
+    told: set[Span] = set()
+    for neuron_type, written in compiled.models:
+        model, span = neuron_type.model, written.source.span if written.model is None else written.model.name.span
+        if span in told or not still_fires(model.definition, model.parameters, compiled.network.dt):
+            continue
+        told.add(span)
+        message = f"with these parameters 'when' of the model '{model.definition.name}' still holds behind 'set'"
+        hint = "a neuron fires once then, until 'when' has been false: let 'set' make it false, or leave it out"
+        findings.warning("unreachable-spike", span, message, hint)
 
 
 def _warn_idle(compiled: Compiled, told: set[Span], findings: Findings) -> None:

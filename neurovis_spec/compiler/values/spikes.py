@@ -13,7 +13,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.flows import reads
 from neurovis_spec.compiler.program import SPIKE, Definition, Hidden, Quantity
+from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
@@ -23,7 +29,7 @@ from neurovis_spec.language.expressions.tree import (
     Number,
     Tree,
     Unary,
-    put,
+    names,
 )
 
 #: Whether it may fire again as far as ``when`` goes, and one more than the steps for which it still rests.
@@ -54,21 +60,29 @@ def when_of(let: Collection[tuple[str, Tree]]) -> Tree | None:
     return next((tree.parts[0] for name, tree in let if name == FIRES), None)
 
 
-def when_after(model: Definition) -> Tree | None:
-    """``when`` of a model with what ``set`` makes of its states put in; None where it sets nothing, or has no spike
-    block."""
+def still_fires(model: Definition, parameters: Mapping[str, FloatArray], dt: float) -> bool:
+    """Whether what ``set`` leaves fulfils ``when`` at any of some neurons, by their parameters, as far as that is
+    known: where ``when`` reads these alone, and states that are set by these alone."""
     when = when_of(model.let)
-    put_in = {
-        one.name: tree.then
-        for one in model.state
-        for phase, tree in one.acts
-        if phase == "fire" and isinstance(tree, Conditional) and not isinstance(one, Hidden) and one.name != SPIKE
-    }
-    if when is None or not put_in:
-        return None
-    for name, tree in reversed([pair for pair in model.let if pair[0] != FIRES]):
-        when = put(when, {name: tree})
-    return put(when, put_in)
+    if when is None or model.reads_activation:
+        return False
+    known: dict[str, Value] = {**CONSTANTS, "dt": dt * model.per_second, **parameters}
+    sets = {one.name: dict(one.acts).get("fire") for one in model.state if one.name != SPIKE}
+    trees = {name: tree.then for name, tree in sets.items() if isinstance(tree, Conditional)}
+    left = {name: _value(model, tree, known) for name, tree in trees.items() if reads(model, [tree]) <= known.keys()}
+    read = reads(model, [when])
+    if read.isdisjoint(left) or not read <= known.keys() | left.keys():
+        return False
+    return bool(np.any(_value(model, when, {**known, **left})))
+
+
+def _value(model: Definition, tree: Tree, known: Mapping[str, Value]) -> Value:
+    """The value of a formula of a model, of which all is known that it reads."""
+    seen = dict(known)
+    for name, one in model.let:
+        if names(one) <= seen.keys():
+            seen[name] = evaluate_array(one, seen)
+    return evaluate_array(tree, seen)
 
 
 def with_spike(states: tuple[Quantity, ...], spike: Spike) -> tuple[Quantity, ...]:
