@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 import neurovis_spec as nv
 
 RESET = """
@@ -36,3 +38,72 @@ def test_a_reset_to_where_it_fires_is_told_where_that_is_known() -> None:
     for reset in ("{v: v - b}", "{w: w + b}"):
         assert not warned("over", reset)
     assert not warned("over and w < 1", "{v: Vr}")
+
+
+BROKEN = """
+neurovis: 1
+name: x
+time: {dt: 1 ms}
+models:
+  cell:
+    time: ms
+    ports: {kick: sum, gain: product}
+    state: {v: {derivative: (drive - v)/7, jump: JUMP, noise: NOISE}, x: {each_step: 0.5*x + gain}}
+    spike: {when: v + 0*x >= 1, set: {v: 0}, refractory: REST}
+synapses: {s: {state: {g: {derivative: -g + GROWS}}, signal: weight*(g + BRINGS)}}
+rules:
+  r: {signals: [by], state: {a: {derivative: -a + LEARNS}}, weight: {each_step: weight + a, on_post: weight + 1}}
+  w: {weight: {derivative: ALONG, on_pre: weight + 1}}
+neurons: {A: {model: cell, bias: 2}, B: {model: cell, bias: 2}}
+connections:
+  A -> B: {weight: 1, port: PORT, synapse: s, plasticity: [{r: {by: SIGNAL}}, w], delay: DELAY}
+"""
+SOUND = {
+    "JUMP": "kick", "NOISE": "1", "REST": "2", "GROWS": "weight*pre.v", "BRINGS": "spike", "LEARNS": "by",
+    "ALONG": "-weight", "PORT": "kick", "SIGNAL": "B.v", "DELAY": "1",
+}  # fmt: skip
+
+
+def found(changes: dict[str, str]) -> list[str]:
+    """The errors, each by its code, its line, and what to do."""
+    text = BROKEN
+    for name, value in {**SOUND, **changes}.items():
+        text = text.replace(name, value)
+    try:
+        nv.compile_text(text)
+    except nv.SpecError as error:
+        return [f"{one.code} {one.span.line} {one.hint}" for one in error.diagnostics]
+    return []
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, ""),
+        ({"NOISE": "spike"}, "spike-in-derivative 9 read it in 'jump'"),
+        ({"GROWS": "spike"}, "spike-in-derivative 11 read it in 'on_pre'"),
+        ({"GROWS": "2*pre.spike"}, "spike-in-derivative 11 read it in 'on_pre'"),
+        ({"GROWS": "post.spike"}, "spike-in-derivative 11 read it in 'each_step'"),
+        ({"GROWS": "pre"}, "spike-in-derivative 17 read it in 'on_pre'"),
+        ({"GROWS": "post"}, "spike-in-derivative 17 read it in 'each_step'"),
+        ({"LEARNS": "post"}, "spike-in-derivative 17 read it in 'on_post'"),
+        ({"LEARNS": "post.spike"}, "spike-in-derivative 13 read it in 'on_post'"),
+        ({"SIGNAL": "B"}, "spike-in-derivative 17 read it in 'each_step'"),
+        ({"SIGNAL": "A.spike"}, "spike-in-derivative 17 read it in 'each_step'"),
+        ({"ALONG": "spike - weight"}, "spike-in-derivative 14 read it in 'on_pre'"),
+        ({"ALONG": "pre*weight"}, "spike-in-derivative 17 read it in 'on_pre'"),
+        ({"PORT": "drive"}, "spike-in-derivative 17 what jumps by spikes there is at port: kick"),
+        ({"PORT": "drive", "BRINGS": "post.spike"}, "spike-in-derivative 17 what jumps by spikes"),
+        ({"DELAY": "0"}, "out-of-range 17 write delay: 1"),
+        ({"JUMP": "kick^2"}, "jump-not-linear 9 as in jump"),
+        ({"JUMP": "1"}, "jump-not-linear 9 as in jump"),
+        ({"JUMP": "kick + k"}, "jump-not-linear 9 as in jump"),
+        ({"JUMP": "gain"}, "jump-not-linear 9 a port by which a state jumps is a sum"),
+        ({"JUMP": "kick +"}, "missing-operand 9"),
+        ({"REST": "-2"}, "out-of-range 10 leave it out"),
+    ],
+)
+def test_each_cause_is_told_once_where_it_is(changes: dict[str, str], expected: str) -> None:
+    errors = found(changes)
+    assert len(errors) == bool(expected), errors
+    assert all(one.startswith(expected) for one in errors), errors

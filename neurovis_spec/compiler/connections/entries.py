@@ -258,7 +258,7 @@ class EntryBuilder:
         check_below_step(delays, into_flow, self.constants)
         if models.fires:
             pairs = models.pairs(sources, targets) + (models.pairs(targets, sources) if self.symmetric else [])
-            check = SpikeCheck(route, made, [one.rule for one in rules], pairs, self.key.span, findings)
+            check = SpikeCheck(route, made, rules, pairs, models, self.key.span, findings)
             check.check(undelayed=bool((delays.steps == 0).any()))
         if not len(shape.i):  # without connections there is nothing that they would do
             rules, synapse = (), None

@@ -470,7 +470,7 @@ class _Checker:
 
     def jumps(self, states: tuple[Quantity, ...], let: tuple[tuple[str, Tree], ...]) -> tuple[Quantity, ...]:
         """The states with what is added to them when spikes arrive: each port counts once, as a factor."""
-        ports, result = [DRIVE, *(port.name.value for port in self.parts.ports)], list[Quantity]()
+        result = list[Quantity]()
         for state in states:
             written = (self.parts.state or {}).get(state.name)
             formula = None if written is None else written.flow.acts.get("jump")
@@ -478,12 +478,26 @@ class _Checker:
                 result.append(state)
                 continue
             tree = self.tree(formula, self.functions)
-            if isinstance(formula.value, str) and share_of(tree, ports, dict(let)) == "other":
-                message = "a jump adds what arrives, times something: each term has one port, as a factor"
-                hint = "as in jump: (1 - g)*excitatory; without spikes nothing is added"
-                self.findings.error("jump-not-linear", formula.span, message, hint)
+            self._check_jump(tree, formula, let)
             result.append(jumping(state, tree))
         return tuple(result)
+
+    def _check_jump(self, tree: Tree, formula: Formula, let: tuple[tuple[str, Tree], ...]) -> None:
+        """Report a jump that adds anything but multiples of what arrives, so that nothing is added where nothing
+        arrives."""
+        if isinstance(tree, Number) and tree.value == 0:  # as of one that is invalid, which is reported
+            return
+        ports, read = [DRIVE, *(port.name.value for port in self.parts.ports)], set(names(tree))
+        for name, between in reversed(let):
+            read |= names(between) if name in read else set()
+        other = next((one for one in self.parts.ports if one.combine != "sum" and one.name.value in read), None)
+        if other is not None:
+            message = f"'{other.name.value}' combines by {other.combine}, and a jump adds up what arrives"
+            self.findings.error("jump-not-linear", formula.span, message, "a port by which a state jumps is a sum")
+        elif share_of(tree, ports, dict(let)) != "multiple":
+            message = "a jump adds what arrives, times something: each term has one port, as a factor"
+            hint = "as in jump: (1 - g)*excitatory; without spikes nothing is added"
+            self.findings.error("jump-not-linear", formula.span, message, hint)
 
     def spike(self, written: SpikeModel) -> Spike:
         """The spike block: when it fires, and what then becomes of the states."""
@@ -492,13 +506,20 @@ class _Checker:
             self._is_state(key, _key_in(written.source, "set", key), states)
         for one in written.hold:
             self._is_state(one.value, one.span, states)
-        refractory = written.refractory
         return Spike(
             self.tree(written.when, self.functions),
             {name: self.tree(formula, self.functions) for name, formula in written.set.items()},
-            None if refractory is None else self.tree(self._in_own_time(refractory), self.functions),
+            None if written.refractory is None else self._refractory(written.refractory),
             [one.value for one in written.hold],
         )
+
+    def _refractory(self, formula: Formula) -> Tree:
+        """How long it cannot fire, in the unit of time of the definition."""
+        tree = self.tree(self._in_own_time(formula), self.functions)
+        if is_constant(tree) and not calls(tree, self.functions) and np.any(evaluate_array(tree, self.constants) < 0):
+            message = "'refractory' is how long it cannot fire, and at least 0"
+            self.findings.error("out-of-range", formula.span, message, "leave it out, if it can fire in each step")
+        return tree
 
     def _is_state(self, name: str, span: Span, states: Collection[str]) -> None:
         if name not in states and not self.known.is_open:
@@ -514,17 +535,21 @@ class _Checker:
 
     def no_spikes(self, definition: Definition) -> None:
         """Report derivatives, and noise, that read a spike, which lasts no time."""
+        names = (_ARRIVING, EndName("post", SPIKE).text, *([SPIKE] if definition.fires else []))
+        flows = {name: one.flow for name, one in (self.parts.state or {}).items()}
+        written = [(definition.given.derivative, self.parts.derivative)]
         for state in definition.flows:
-            read = reads(definition, (state.derivative, state.noise))
-            spikes = [name for name in (SPIKE, _ARRIVING, EndName("post", SPIKE).text) if name in read]
-            if not spikes or (spikes == [SPIKE] and not definition.fires):
+            flow = flows[state.name]
+            written += [(state.derivative, flow.derivative), (state.noise, flow.noise)]
+        for tree, formula in written:
+            spikes = [name for name in names if name in reads(definition, [tree])]
+            if not spikes or formula is None:
                 continue
-            written = (self.parts.state or {})[state.name].flow.derivative
-            name = "spike" if self.arriving and spikes[0] == _ARRIVING else spikes[0]
+            name = SPIKE if self.arriving and spikes[0] == _ARRIVING else spikes[0]
             message = f"'{name}' in a derivative: a spike lasts no time, so that its effect would depend on dt"
-            hint = "read it in 'jump'" if definition.kind == MODEL else "read it in 'on_pre'"
-            place = self.model.source.span if written is None else written.span
-            self.findings.error("spike-in-derivative", place, message, hint)
+            act = "jump" if definition.kind == MODEL else "on_pre" if spikes[0] == _ARRIVING else "on_post"
+            act = "each_step" if act == "on_post" and definition.kind == SYNAPSE else act
+            self.findings.error("spike-in-derivative", formula.span, message, f"read it in '{act}'")
 
 
 def _key_in(source: SourceMapping, section: str, name: str) -> Span:
