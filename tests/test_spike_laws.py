@@ -374,3 +374,17 @@ connections:
     assert [line for line in shown if line in order] == order
     assert "spikes that arrive before the threshold is tested A -> B, A -> A" in shown
     assert "spikes that act behind all of their step B -> A" in shown
+
+
+def test_inspect_says_nothing_of_rules_that_wait_for_no_spikes() -> None:
+    """Several rules of a connection have an order, too, which their list says."""
+    compiled = nv.compile_text("""
+neurovis: 1
+name: rules
+time: {dt: 0.01}
+models: {cell: {state: {v: {derivative: drive - v}}, activity: v}}
+neurons: {A: {model: cell, bias: 1}, B: {model: cell}}
+connections: {A -> B: {weight: 0.1, plasticity: [hebbian, decay]}}
+""")
+    assert "integrate  A B  v (rk4)\n  update     A B\n" in overview(compiled)
+    assert "each_step" not in overview(compiled)

@@ -17,7 +17,7 @@ from neurovis_spec.cli.tables import number, spread, table
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE
 from neurovis_spec.compiler.program import (
-    PHASES,
+    RULE,
     SYNAPSE,
     Advance,
     Definition,
@@ -227,7 +227,7 @@ def _rows(network: Network, operation: Operation) -> Iterator[tuple[str, str, st
         case Advance(population=one, phase=phase):
             changing = _changed(network.populations[one].model.definition.during([phase]))
             yield _PHASES.get(phase, phase), _members(network, one), changing
-        case Learn(projection=one, phases=phases) if phases != PHASES:
+        case Learn(projection=one, phases=phases) if _wait_for_spikes(network):
             projection = network.projections[one].during(phases)
             yield ", ".join(phases), _connected(network, one), _changed(projection.use.definition)
         case Integrate(populations=several, method=method, substeps=substeps, projections=connected):
@@ -245,6 +245,11 @@ def _rows(network: Network, operation: Operation) -> Iterator[tuple[str, str, st
             for one in several:
                 flows = network.populations[one].model.definition.flows
                 yield "noise", _members(network, one), ", ".join(state.name for state in flows if state.noise)
+
+
+def _wait_for_spikes(network: Network) -> bool:
+    """Whether any rule does, so that the order of all counts."""
+    return any(one.kind == RULE and one.use.definition.acts for one in network.projections)
 
 
 def _changed(made: Definition) -> str:
