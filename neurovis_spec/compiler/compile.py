@@ -405,7 +405,7 @@ def _signals_fit(bundles: tuple[Bundle, ...], neurons: int, findings: Findings) 
 def _step_length(spec: Spec, constants: Constants) -> bool:
     """dt, before anything else: parameters may use it, so it uses none of them. Whether it is in order, or left out."""
     if spec.time is None or spec.time.dt is None:
-        return spec.time is None or "dt" not in spec.time.unknown
+        return "time" not in spec.unknown if spec.time is None else "dt" not in spec.time.unknown
     known = "'dt' comes before the parameters, which may use it; known here"
     if parse_formula(spec.time.dt, Sight(CONSTANTS, known), constants.findings) is UNKNOWN:
         return False
