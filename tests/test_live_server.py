@@ -459,7 +459,7 @@ BROKEN: list[str | bytes] = [
         json.dumps({"type": "trace", "items": ["n1"], "first": 0, "every": 1, "bins": 9} | wrong)
         for wrong in (
             *({"first": -1}, {"every": 0}, {"bins": 0}, {"bins": 1 << 20}, {"every": 1 << 60}, {"items": ["n"]}),
-            *({"items": [f"n{index}" for index in range(17)]}, {"first": 0.5}, {"more": 1}),
+            *({"items": [f"n{index}" for index in range(25)]}, {"first": 0.5}, {"more": 1}),
         )
     ),
     *('{"type": "place", "neuron": "B", "at": [0, 0]}', '{"type": "place", "neuron": "B", "at": [0], "done": true}'),
