@@ -11,7 +11,6 @@ import pytest
 import neurovis_spec as nv
 from neurovis_spec.runtime.columns import spiking_of
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.events import are_spikes
 from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.journal import MAGIC
 from neurovis_spec.runtime.recording import Recording
@@ -210,7 +209,7 @@ def test_a_written_activity_that_is_the_spike_is_one() -> None:
     """As one that is not written: it is drawn as spikes, and connections wait for those of what fires alone."""
     written = nv.compile_text(SPEC.replace("refractory: 2}", "refractory: 2}\n    activity: spike"))
     for network in (NETWORK.network, written.network):
-        assert are_spikes(network).tolist() == [True] * 3 + [False] * 4
+        assert network.spikes.tolist() == [True] * 3 + [False] * 4
         assert spiking_of(network).by_activity.tolist() == [0, 1, 2, 5]
         assert spiking_of(network).by_state.tolist() == [3, 4]
     assert spikes_of(written.run(backend="numpy")) == TRUTH

@@ -32,7 +32,6 @@ from neurovis_spec.compiler.program import (
 )
 from neurovis_spec.describe import wired
 from neurovis_spec.diagnostics import printable
-from neurovis_spec.runtime.events import are_spikes
 from neurovis_spec.runtime.stages import acts_now, taken_by
 
 if TYPE_CHECKING:
@@ -260,7 +259,7 @@ def _changed(made: Definition) -> str:
 
 def _spikes(network: Network) -> Iterator[tuple[str, str]]:
     """The entries that bring spikes, and when these count."""
-    spikes, names = are_spikes(network), network.connections.entries
+    spikes, names = network.spikes, network.connections.entries
     for population in network.populations if spikes.any() else ():
         for port in population.ports:
             now = acts_now(port)

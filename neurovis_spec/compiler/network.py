@@ -602,12 +602,22 @@ class Network:
         return result
 
     @cached_property
-    def spiking(self) -> BoolArray:
-        """For each neuron whether its activity is a spike."""
-        found = np.zeros(len(self.neurons), dtype=np.bool_)
+    def spikes(self) -> BoolArray:
+        """For the activities of all neurons and the outlets behind them whether they are spikes."""
+        n = len(self.neurons)
+        found = np.zeros(n + self.outlet_count, dtype=np.bool_)
         for population in self.populations:
             found[population.members] = is_spike(population.model.definition, MODEL.gives)
+        for one in self.outlets:
+            population = self.populations[one.population]
+            start = n + one.start
+            found[start : start + len(population.members)] = is_spike(population.model.definition, one.name)
         return frozen(found)
+
+    @property
+    def spiking(self) -> BoolArray:
+        """For each neuron whether its activity is a spike."""
+        return self.spikes[: len(self.neurons)]
 
     @cached_property
     def clampable_of_neurons(self) -> int:

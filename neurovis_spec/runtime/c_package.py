@@ -24,7 +24,7 @@ from neurovis_spec.runtime.c_export import Exported
 from neurovis_spec.runtime.c_names import words
 from neurovis_spec.runtime.c_plan import STAGES
 from neurovis_spec.runtime.c_settable import ExportError
-from neurovis_spec.runtime.events import are_spikes, takes_spikes
+from neurovis_spec.runtime.events import takes_spikes
 from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.stages import (
     Formulas,
@@ -208,10 +208,9 @@ def _of_spikes(exported: Exported) -> list[str]:
     if spiking is None:
         return []
     visited = np.zeros(len(network.connections), dtype=np.bool_)
-    spikes = are_spikes(network)
     for population in network.populations:
         for port in population.ports:
-            if takes_spikes(network, port, spikes):
+            if takes_spikes(network, port):
                 visited[port.incoming] = True
     for one in network.projections:
         if any(one.use.definition.has(phase) for phase in AT_SPIKE):

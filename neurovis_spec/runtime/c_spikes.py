@@ -28,10 +28,9 @@ _AT_ONCE = 16
 
 @dataclass(frozen=True)
 class Firing:
-    """Writes what comes of spikes; ``spikes`` says which of all activities and outlets are some."""
+    """Writes what comes of spikes."""
 
     ends: Ends
-    spikes: BoolArray
     code: Code
     form: Form
 
@@ -157,7 +156,7 @@ class Firing:
     def own(self, layout: SignalLayout) -> BoolArray:
         """The connections (m,) that send spikes and have slots of their own."""
         there = (layout.offsets >= 0) & ~layout.shares
-        return np.asarray(there & self.spikes[taken_by(self.ends.network)])
+        return np.asarray(there & self.ends.network.spikes[taken_by(self.ends.network)])
 
     def leave(self, which: BoolArray, layout: SignalLayout) -> None:
         """The signals of some connections (m,) leave, which send spikes and have slots of their own: written are those

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import HIGH, LOW, bias_of
 from neurovis_spec.compiler.network import Input, Network, Outlet
 from neurovis_spec.compiler.program import (
@@ -56,7 +56,7 @@ from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name, wo
 from neurovis_spec.runtime.c_connections import Ends, Forming, Sight, Some, taken, taken_at
 from neurovis_spec.runtime.c_plan import Plan, plan_of
 from neurovis_spec.runtime.c_spikes import Firing
-from neurovis_spec.runtime.events import are_spikes, rows_of, takes_spikes
+from neurovis_spec.runtime.events import rows_of, takes_spikes
 from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
 from neurovis_spec.runtime.stages import acts_now, port_with, signal_of, target_of, unfolded
 from neurovis_spec.runtime.state import Mask
@@ -102,7 +102,7 @@ class Built:
     @cached_property
     def incoming(self) -> list[list[Incoming]]:
         """What arrives at each port of each population, but for spikes of the same step that act behind all."""
-        network, spikes = self.network, self.spikes
+        network = self.network
         return [
             [
                 incoming_of(
@@ -110,17 +110,12 @@ class Built:
                     port if port.now is None else port_with(port, ~acts_now(port)),
                     len(one.members),
                     fusible=network.sending is None and _plain(one),
-                    spiking=takes_spikes(network, port, spikes),
+                    spiking=takes_spikes(network, port),
                 )
                 for port in one.ports
             ]
             for one in network.populations
         ]
-
-    @cached_property
-    def spikes(self) -> BoolArray:
-        """Which of all activities and outlets are spikes."""
-        return are_spikes(self.network)
 
     @cached_property
     def now(self) -> list[list[Incoming | None]]:
@@ -146,7 +141,7 @@ class StepCode:
         #: what formulas of synapses see before their targets are updated, and those of rules behind all
         self.sight, self.behind = Sight(built.ends, code, form), Sight(built.ends, code, form, sent=True)
         synapses = ((number, one) for number, one in enumerate(network.projections) if one.kind == SYNAPSE)
-        self.firing = Firing(built.ends, built.spikes, code, form)
+        self.firing = Firing(built.ends, code, form)
         self.forming = forming = Forming(self.sight, {number: signal_of(one) for number, one in synapses})
         #: what ports have beside what arrives, by their names
         self.own = {name: _own(network, name) for name in network.port_names}
@@ -732,7 +727,7 @@ class StepCode:
     def share(self, slots: SharedSlots) -> None:
         """What is sent to all connections that share it; of spikes where something fires, or did when that left which
         is there."""
-        spikes = self.firing.spikes[slots.sent]
+        spikes = self.network.spikes[slots.sent]
         if self.form.written_out or not spikes.any():
             self.store_each(len(slots.sent), partial(self.sharing, slots))
             return

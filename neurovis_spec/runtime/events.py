@@ -11,31 +11,17 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, Indices, IntArray
-from neurovis_spec.compiler.flows import is_spike
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Port
 
 
-def are_spikes(network: Network) -> BoolArray:
-    """For the activities of all neurons and the outlets behind them whether they are spikes."""
-    n = len(network.neurons)
-    found = np.zeros(n + network.outlet_count, dtype=np.bool_)
-    found[:n] = network.spiking
-    for one in network.outlets:
-        population = network.populations[one.population]
-        start = n + one.start
-        found[start : start + len(population.members)] = is_spike(population.model.definition, one.name)
-    return found
-
-
-def takes_spikes(network: Network, port: Port, spikes: BoolArray) -> bool:
-    """Whether spikes are all that comes to a port, and are added up there. ``spikes``: what of all that can be taken is
-    one."""
-    if port.combine != "sum" or not len(port.incoming) or not spikes.any():
+def takes_spikes(network: Network, port: Port) -> bool:
+    """Whether spikes are all that comes to a port, and are added up there."""
+    if port.combine != "sum" or not len(port.incoming) or not network.spikes.any():
         return False
     sources = network.connections.sources
     taken = sources.some(port.incoming) if network.sending is None else network.sending[port.incoming]
-    return bool(spikes[taken].all() and (network.synapses.numbers[port.incoming] < 0).all())
+    return bool(network.spikes[taken].all() and (network.synapses.numbers[port.incoming] < 0).all())
 
 
 def weights_stay(network: Network) -> BoolArray:

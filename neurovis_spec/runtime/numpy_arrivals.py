@@ -18,7 +18,7 @@ from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import CENTRES, bias_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import CENTRE, Population, Port, Projection
-from neurovis_spec.runtime.events import are_spikes, in_order, rows_of, takes_spikes
+from neurovis_spec.runtime.events import in_order, rows_of, takes_spikes
 from neurovis_spec.runtime.lags import Lags
 from neurovis_spec.runtime.numpy_code import Code, any_given
 from neurovis_spec.runtime.numpy_spikes import Arriving, sums
@@ -58,11 +58,6 @@ class Step:
     spread: dict[tuple[int, str], str] = field(default_factory=dict)
     #: by projections, those of the signals of synapses before their targets are updated
     formed: dict[int, str] = field(default_factory=dict)
-
-    @property
-    def spikes(self) -> BoolArray:
-        """Which of all activities and outlets are spikes."""
-        return are_spikes(self.network)
 
     def working(self, number: int) -> Working:
         """The connections of a projection that do something."""
@@ -123,7 +118,7 @@ def _spikes_at(step: Step, port: Port, places: Indices, count: int) -> str:
     delays = network.connections.delays[incoming]
     shares = step.layout.shares[incoming] | (delays == 0)
     alike = bool((delays > 0).any()) == bool((delays > 0).all()) and bool(shares.any()) == bool(shares.all())
-    if not (alike and takes_spikes(network, port, step.spikes)):
+    if not (alike and takes_spikes(network, port)):
         return ""
     rows = rows_of(np.asarray(taken_by(network)[incoming], dtype=np.int64), delays)
     lost, order = step.structure.lost[incoming], rows.order

@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import Indices
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.events import are_spikes
 from neurovis_spec.runtime.lags import lags_of
 from neurovis_spec.runtime.stages import ends_of, taken_by
 
@@ -46,6 +45,5 @@ def _looking_back(network: Network) -> Iterator[Indices]:
     for one in network.projections:
         if any(end.past for end in ends_of(network, one).values()):
             yield one.members
-    spikes = are_spikes(network)
-    if spikes.any():
-        yield np.flatnonzero(spikes[taken_by(network)] & (network.synapses.numbers < 0))
+    if network.spikes.any():
+        yield np.flatnonzero(network.spikes[taken_by(network)] & (network.synapses.numbers < 0))

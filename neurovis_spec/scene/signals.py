@@ -23,7 +23,6 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SYNAPSE
 from neurovis_spec.diagnostics import listed
 from neurovis_spec.runtime.columns import Probe, probe_of
-from neurovis_spec.runtime.events import are_spikes
 from neurovis_spec.runtime.stages import taken_by
 
 if TYPE_CHECKING:
@@ -105,7 +104,7 @@ class Signals:
     @cached_property
     def spikes(self) -> Mask:
         """Which of the k numbers are spikes, or signals that synapses form of a spike: they last for one step."""
-        are = are_spikes(self.network)
+        are = self.network.spikes
         found = are[len(self.network.neurons) + self.network.taken]
         read = np.zeros(len(self.network.connections), np.bool_)
         sent = taken_by(self.network)
