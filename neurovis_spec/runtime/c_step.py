@@ -252,7 +252,7 @@ class StepCode:
 
             others = {one: own for one, own in arrivals.items() if one not in ahead}
             if parts := self.apart(number):
-                self.part_by_part(number, parts, others, ahead, gathered)
+                self.part_by_part(number, parts, others, gathered)
             else:
                 self.each(len(population.members), others, updated)
 
@@ -286,45 +286,28 @@ class StepCode:
         number: int,
         parts: Sequence[Definition],
         arrivals: Mapping[int, Arrivals],
-        ahead: Mapping[int, Arrivals],
         gathered: Mapping[int, str],
     ) -> None:
         """The neurons of a population, part by part of its model; what arrives is read by the first of these."""
         population, code = self.network.populations[number], self.code
-        count, model = len(population.members), population.model
-        read = self.read_at_update[number]
+        count, last = len(population.members), parts[-1]
+        no_ports: dict[str, Value] = {port.name: 0.0 for port in population.ports}
 
-        def changed(part: Definition, place: Place, totals: Mapping[int, str]) -> dict[str, Value]:
-            sums = {**totals, **{one: f"{name}[{place}]" for one, name in gathered.items()}}
-            first, ports = part is parts[0], dict[str, Value]()
-            for one, port in enumerate(population.ports):
-                is_read = first and port.name in read
-                ports[port.name] = self.at_port(number, one, place, sums.get(one, "")) if is_read else 0.0
-            if first:
-                self.hold_states(model, place)
-            stored = self.states(model, place)
-            states = {one.name: stored[one.name] for one in part.state}
-            seen = {**code.parameters(model, place), **self.sight.clock(part), **ports}
-            functions, kept = self.activation(population, place), partial(self.unless_held, model, place)
-            new, given = self.change(part, seen, states, functions, kept, self.form.first)
-            self.store([(stored[name], value) for name, value in new.items()])
-            return given
+        def carried_out(place: Place, totals: Mapping[int, str], part: Definition) -> None:
+            ports = no_ports
+            if part is parts[0]:
+                sums = {**totals, **{one: f"{name}[{place}]" for one, name in gathered.items()}}
+                ports = self.at_ports(number, place, sums)
+                self.hold_states(population.model, place)
+            given = self.carry_out(number, place, part, ports)
+            if part is last:
+                neuron = code.at(population.members, place)
+                self.put_given(number, place, neuron, given)
+                self.hold_activity(neuron)
+                self.let_out(number, place, neuron)
 
-        def before(place: Place, totals: Mapping[int, str], part: Definition) -> None:
-            changed(part, place, totals)
-
-        for part in parts[:-1]:
-            self.each(count, arrivals if part is parts[0] else _NO_ARRIVALS, partial(before, part=part))
-
-        def last(place: Place, totals: Mapping[int, str]) -> None:
-            given, neuron = changed(parts[-1], place, totals), code.at(population.members, place)
-            stored = self.states(model, place)
-            self.store([(stored[one.name], given[one.name]) for one in parts[-1].outputs])
-            self.store([(f"activity[{neuron}]", given["activity"])])
-            self.hold_activity(neuron)
-            self.let_out(number, place, neuron)
-
-        self.each(count, _NO_ARRIVALS, last)
+        for part in parts:
+            self.each(count, arrivals if part is parts[0] else _NO_ARRIVALS, partial(carried_out, part=part))
 
     def reads_within(self, population: Population, arrivals: Arrivals) -> bool:
         """Whether synapses that lead to a population read, before any of it is updated, what is there of others of its
@@ -438,12 +421,7 @@ class StepCode:
             code.line(f"    activity[{neuron}] = {value};")
             code.line("} else {")
             code.indent += 1
-        read = self.read_at_update[number]
-        ports: dict[str, Value] = {}
-        for one, port in enumerate(population.ports):
-            total = totals.get(one, "")
-            ports[port.name] = self.at_port(number, one, place, total) if port.name in read else 0.0
-        self.advance(number, place, neuron, ports)
+        self.advance(number, place, neuron, self.at_ports(number, place, totals))
         if may_take:
             code.indent -= 1
             code.line("}")
@@ -453,7 +431,7 @@ class StepCode:
     def jump_now(self, number: int) -> None:
         """The states of a population that jump by spikes of the same step, which ports hold alone."""
         population, code = self.network.populations[number], self.code
-        made = replace(population.model.definition.during(["jump_now"]), gives=())
+        made = _in_advance(population.model.definition, "jump_now")
         read = self._read_in(made)
         arrivals = {
             one: Arrivals(self.network, incoming, code, self.form, self.layout, self.forming)
@@ -465,14 +443,9 @@ class StepCode:
             ports: dict[str, Value] = {port.name: 0.0 for port in population.ports}
             for one, own in arrivals.items():
                 ports[population.ports[one].name] = code.let("u", totals.get(one) or own.combined(place))
-            seen = {**code.parameters(population.model, place), **self.sight.clock(made), **ports}
-            stored = self.states(population.model, place)
-            functions, kept = self.activation(population, place), partial(self.unless_held, population.model, place)
-            new, _ = self.change(made, seen, stored, functions, kept)
-            self.store([(stored[name], value) for name, value in new.items()])
+            self.carry_out(number, place, made, ports)
 
-        with self.unless_first():
-            self.each(len(population.members), arrivals, jumped)
+        self.each(len(population.members), arrivals, jumped)
 
     def let_all_out(self) -> None:
         """What connections take beside activities, of all neurons."""
@@ -509,9 +482,7 @@ class StepCode:
         """What of the model of a population is carried out at its update, one behind the other; the last gives the
         activity and the outputs."""
         made = self.network.populations[number].model.definition
-        # nothing of these is carried out at the first step, as of what fires
-        ahead = (replace(made.during([phase]), gives=(), fires=True) for phase in self.phases[number])
-        return *ahead, made.at_update
+        return *(_in_advance(made, phase) for phase in self.phases[number]), made.at_update
 
     def _read_in(self, made: Definition) -> frozenset[str]:
         """The names that a part of a model reads when its neurons are updated, derivatives left out."""
@@ -520,6 +491,14 @@ class StepCode:
         ends = [] if self.network.episode is None else [one.each_episode for one in made.lasting]
         readers = [*(one.each_step for one in (*made.lasting, *made.fleeting)), *ends]
         return unfolded(made.let, readers).names
+
+    def at_ports(self, number: int, place: Place, totals: Mapping[int, str]) -> dict[str, Value]:
+        """All ports of a neuron at u[t], by their names, as far as its update reads them."""
+        read = self.read_at_update[number]
+        return {
+            port.name: self.at_port(number, one, place, totals.get(one, "")) if port.name in read else 0.0
+            for one, port in enumerate(self.network.populations[number].ports)
+        }
 
     def at_port(self, number: int, port_number: int, place: Place, total: str) -> Value:
         """A port at u[t]: what arrives, combined, + bias + input + noise."""
@@ -573,21 +552,28 @@ class StepCode:
     def advance(self, number: int, place: Place, neuron: Place, ports: Mapping[str, Value]) -> None:
         """The states of a neuron from old ones and its ports, its activity and its outputs from the new ones; the
         episode's end. Those of a model with derivatives stay as they are at the first step."""
-        code, population = self.code, self.network.populations[number]
-        made, stored = population.model.definition, self.states(population.model, place)
-        seen: Mapping[str, Value] = {**code.parameters(population.model, place), **self.sight.clock(made), **ports}
-        states: dict[str, Value] = {one.name: stored[one.name] for one in made.state}
-        self.hold_states(population.model, place)
-        functions, kept = self.activation(population, place), partial(self.unless_held, population.model, place)
-        changed: dict[str, Value] = {}
-        *ahead, last = self.definitions(number)
-        for part in ahead:
-            new, _ = self.change(part, seen, states, functions, kept, self.form.first)
-            states |= new
-            changed |= new
-        new, given = self.change(last, seen, states, functions, kept, self.form.first)
-        self.store([(stored[name], value) for name, value in (changed | new).items()])
-        self.store([(stored[one.name], given[one.name]) for one in made.outputs])
+        self.hold_states(self.network.populations[number].model, place)
+        given: dict[str, Value] = {}
+        for part in self.definitions(number):
+            given = self.carry_out(number, place, part, ports)
+        self.put_given(number, place, neuron, given)
+
+    def carry_out(self, number: int, place: Place, part: Definition, ports: Mapping[str, Value]) -> dict[str, Value]:
+        """What a part of the model of a population makes of the states of a neuron, stored; and what it gives."""
+        population = self.network.populations[number]
+        model, stored = population.model, self.states(population.model, place)
+        states = {one.name: stored[one.name] for one in part.state}
+        seen: Mapping[str, Value] = {**self.code.parameters(model, place), **self.sight.clock(part), **ports}
+        functions, kept = self.activation(population, place), partial(self.unless_held, model, place)
+        new, given = self.change(part, seen, states, functions, kept, begins=self.form.first)
+        self.store([(stored[name], value) for name, value in new.items()])
+        return given
+
+    def put_given(self, number: int, place: Place, neuron: Place, given: Mapping[str, Value]) -> None:
+        """The outputs of a neuron and its activity."""
+        model = self.network.populations[number].model
+        stored = self.states(model, place)
+        self.store([(stored[one.name], given[one.name]) for one in model.definition.outputs])
         self.store([(f"activity[{neuron}]", given["activity"])])
 
     def hold_states(self, use: Use, place: Place) -> None:
@@ -945,6 +931,12 @@ class StepCode:
         some = Some(projection.use.owner.number, np.arange(len(projection.members)), place)
         ends = () if self.network.episode is None else (one.each_episode for one in made.lasting)
         return self.behind.at_ends(some, unfolded(made.let, [*made.steps.values(), *ends]).names)
+
+
+def _in_advance(model: Definition, phase: Phase) -> Definition:
+    """What of a model is carried out in a phase apart from its update: states alone, and, as of what fires, nothing at
+    the first step."""
+    return replace(model.during([phase]), gives=(), fires=True)
 
 
 def _phases(network: Network, population: int) -> tuple[Phase, ...]:
