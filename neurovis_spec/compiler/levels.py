@@ -120,9 +120,8 @@ def acting_now(models: Sequence[Definition], model: Indices, wired: Wired) -> di
     taken = Taken(models, model, wired)
     plain = wired.undelayed & ~taken.of_entries(lambda synapse: True)
     spikes = plain & taken.all("pre", taken.of_models(is_spike))
-    result = {}
+    result, reading = {}, [ports_read_by(one) for one in models]
     for port, line in wired.lines.items():
-        reading = [ports_read_by(one) for one in models]
         alone = np.array([port in one.jump - one.update - one.flow for one in reading], dtype=np.bool_)[model]
         connections = slice(None) if line.connections is None else line.connections
         found = spikes[connections] & alone[wired.targets.compact()[connections]]

@@ -20,6 +20,7 @@ Every identifier is new: its letter says what it is, its number sets it apart. c
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import singledispatch
 
@@ -83,13 +84,9 @@ def _gather(operation: Gather, step: Step) -> None:
     alone."""
     population = step.network.populations[operation.population]
     read = ports_read_by(population.model.definition).once
-    if operation.now:
-        step.ports[operation.population] = {
-            port.name: brought_now(step, operation.population, port) for port in population.ports if port.name in read
-        }
-        return
+    brought = brought_now if operation.now else gathered
     step.ports[operation.population] = {
-        port.name: gathered(step, operation.population, port) for port in population.ports if port.name in read
+        port.name: brought(step, operation.population, port) for port in population.ports if port.name in read
     }
 
 
@@ -109,10 +106,10 @@ def _advance(operation: Advance, step: Step) -> None:
     code.indent -= 1
 
 
-def _cell(code: Code, use: Use, name: str, count: int) -> Cell:
-    """A state of all members of a population."""
+def _cell(code: Code, use: Use, name: str, count: int, kept: Callable[[str], str] = str) -> Cell:
+    """A state of all members of a population, and what is ``kept`` of a new value."""
     now, key = code.state(use, name), code.constant(Key(use.owner, name))
-    return Cell(now, f"{now}[:]", held=f"held_at(fixed, {key}, {{}}, {count})".format)
+    return Cell(now, f"{now}[:]", kept, f"held_at(fixed, {key}, {{}}, {count})".format)
 
 
 @emit.register
@@ -137,9 +134,9 @@ def _receive(operation: Receive, step: Step) -> None:
     read = unfolded(definition.let, trees).names
     if projection.when:
         with come_to_some(step, Working(projection, some), sent=False) as which:
-            weights = f"weights[{code.constant(projection.members.astype(np.intp))}[{which}]]"
-            seen = seen_by(step, Working(projection, some), which, read) | {"weight": weights}
-            emit_change(code, definition, seen, _cells_at(code, projection, some, which), None)
+            seen = seen_by(step, Working(projection, some), which, read)
+            seen["weight"] = _weights_at(code, projection, which)
+            emit_change(code, definition, seen, _cells_of(code, projection, some, which), None)
         return
     seen = code.parameters(projection.use, some) | seen_before_update(step, projection, read)
     cells = _cells_of(code, projection, some)
@@ -163,13 +160,8 @@ def _update(operation: Update, step: Step) -> None:
         return f"np.where({mask}, {at_first_step}, {value}) if {FIRST} else {value}" if mask else value
 
     def cell(name: str) -> Cell:
-        now, key, count = code.state(model, name), code.constant(Key(model.owner, name)), len(population.members)
-        return Cell(
-            now,
-            f"{now}[:]",
-            lambda value: unless_first(value, now),
-            lambda value: f"held_at(fixed, {key}, {value}, {count})",
-        )
+        now = code.state(model, name)
+        return _cell(code, model, name, len(population.members), lambda value: unless_first(value, now))
 
     if model.definition.state:
         code.line(f"if fixed: hold_cells(fixed, {code.constant((model.owner,))}, cells)")
@@ -295,34 +287,30 @@ def _learn_of_spikes(step: Step, working: Working) -> None:
     definition = projection.rule.definition
     read = unfolded(definition.let, definition.steps.values()).names
     with come_to_some(step, working, sent=True) as which:
-        seen, cells = seen_by(step, working, which, read), _cells_at(code, projection, learning, which)
+        seen, cells = seen_by(step, working, which, read), _cells_of(code, projection, learning, which)
         if not definition.moves_centre:
-            weights = f"weights[{code.constant(projection.members.astype(np.intp))}[{which}]]"
+            weights = _weights_at(code, projection, which)
             cells["weight"] = Cell(weights, weights, lambda weight: _bounded(code, network, projection, weight, which))
         emit_change(code, definition, seen, cells, None)
 
 
-def _cells_at(code: Code, projection: Projection, some: IntArray | None, which: str) -> dict[str, Cell]:
-    """What is kept of a synapse or a rule at those of the connections of a projection, ``some`` of all or all, that
-    code says."""
-    use, at = projection.use, which if some is None else f"{code.constant(some)}[{which}]"
-
-    def cell(name: str) -> Cell:
-        place, key = f"{code.state(use, name)}[{at}]", code.constant(Key(use.owner, name))
-        return Cell(place, place, held=f"held_at(fixed, {key}, {{}}, len({which}), {at})".format)
-
-    return {one.name: cell(one.name) for one in use.definition.kept}
+def _weights_at(code: Code, projection: Projection, which: str) -> str:
+    """The weights of those of the connections of a projection that code says."""
+    return f"weights[{code.constant(projection.members.astype(np.intp))}[{which}]]"
 
 
-def _cells_of(code: Code, projection: Projection, some: IntArray | None) -> dict[str, Cell]:
-    """What is kept of a synapse or a rule at the connections of a projection, which are ``some`` of all or all."""
-    use, count = projection.use, len(projection.members)
-    place, which = ("", None) if some is None else (f"[{code.constant(some)}]", code.constant(some))
+def _cells_of(code: Code, projection: Projection, some: IntArray | None, which: str = "") -> dict[str, Cell]:
+    """What is kept of a synapse or a rule at the connections of a projection, which are ``some`` of all or all; or at
+    those of them that code says."""
+    use, at = projection.use, which
+    if some is not None:
+        at = f"{code.constant(some)}[{which}]" if which else code.constant(some)
+    count = f"len({which})" if which else f"{len(projection.members)}"
 
     def cell(name: str) -> Cell:
         now, key = code.state(use, name), code.constant(Key(use.owner, name))
-        held = f"held_at(fixed, {key}, {{}}, {count}, {which})".format
-        return Cell(f"{now}{place}", f"{now}{place or '[:]'}", held=held)
+        held = f"held_at(fixed, {key}, {{}}, {count}, {at or None})".format
+        return Cell(f"{now}[{at}]" if at else now, f"{now}[{at or ':'}]", held=held)
 
     return {one.name: cell(one.name) for one in use.definition.kept}
 
