@@ -81,6 +81,8 @@ class ReferenceStepper(Seen):
         self.high = NetworkArray(connections.high.whole(), variables.get(HIGH))
         #: what integrates flow states
         self.flows = [Flow(self, operation) for operation in network.program if isinstance(operation, Integrate)]
+        #: of each population what of its model its update carries out
+        self.updating = [replace(one.model, definition=one.model.definition.at_update) for one in network.populations]
         #: by populations, then by ports, what each member was given there last
         self.ports: dict[int, dict[str, list[float]]] = {}
 
@@ -116,7 +118,7 @@ class ReferenceStepper(Seen):
                 state.activity[neuron] = initial
             else:
                 own = {name: values[position] for name, values in ports.items()}
-                state.activity[neuron] = self.advance(population, position, own, state)
+                state.activity[neuron] = self.advance(number, position, own, state)
             held = state.conditions.held_at(neuron)
             if held is not None:
                 state.activity[neuron] = held
@@ -162,12 +164,12 @@ class ReferenceStepper(Seen):
                 if (outlet.population, outlet.name) == (operation.population, name):
                     self.let_out(outlet, np.array(values), state)
 
-    def advance(self, population: Population, position: int, ports: dict[str, float], state: State) -> float:
-        """One neuron's step: its states and outputs are replaced, its activity is returned."""
+    def advance(self, number: int, position: int, ports: dict[str, float], state: State) -> float:
+        """The step of one neuron of a population: its states and outputs are replaced, its activity is returned."""
+        population = self.network.populations[number]
         seen = self.known(population.model, position, state) | ports
         functions = self.functions_of(population, position, state)
-        use = replace(population.model, definition=population.model.definition.at_update)
-        return self.change(use, position, seen, state, {}, functions)["activity"]
+        return self.change(self.updating[number], position, seen, state, {}, functions)["activity"]
 
     def change(
         self,
