@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import pytest
-from hypothesis import Phase, assume, given, settings
+from hypothesis import Phase, given, settings
 from random_specs import Spec
 from random_spikes import spiking_specs
+from test_flow_conformance import arrays, compiled
 
 import neurovis_spec as nv
-from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.runtime import c_backend
 from neurovis_spec.runtime.backend import Backend, BackendError, Capabilities
 from neurovis_spec.runtime.c_backend import CBackend
@@ -25,29 +22,9 @@ from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.reference import ReferenceBackend
 from neurovis_spec.runtime.simulation import Simulation
-from neurovis_spec.runtime.state import State, initial_state
+from neurovis_spec.runtime.state import initial_state
 
 BACKENDS = ["numpy", pytest.param("c", marks=pytest.mark.compiler)]
-
-
-def compiled(spec: Spec) -> Network:
-    """The network of a spec, unless connections without delay form a cycle in it."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return nv.compile(spec).network
-    except SpecError as error:
-        assume(all(one.code not in ("delay-0-cycle", "algebraic-loop") for one in error.diagnostics))
-        raise
-
-
-def arrays(state: State) -> dict[str, FloatArray]:
-    """All numbers of a state, by what they are."""
-    cells = {f"{owner}.{name}": values for owner, own in state.cells.items() for name, values in own.items()}
-    return {
-        "activity": state.activity, "outlets": state.outlets, "weights": state.weights, "signals": state.signals,
-        "history": state.history, **cells,
-    }  # fmt: skip
 
 
 def follow(network: Network, backend: Backend, steps: int = 14) -> int:
