@@ -136,8 +136,8 @@ def test_the_readme_says_what_spikes_take_at_worst(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seconds", [0.0012, 0.0027])
-def test_a_rule_that_waits_for_spikes_has_a_delay_of_whole_steps(seconds: float) -> None:
-    """Where what is sent flows, and would arrive between steps: a spike comes once, at the end of one."""
+def test_a_spike_comes_once_where_what_is_sent_arrives_between_steps(seconds: float) -> None:
+    """A rule is told of it at the end of a step, as all backends have it."""
     text = """\
 neurovis: 1
 name: between

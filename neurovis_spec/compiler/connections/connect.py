@@ -30,7 +30,6 @@ from neurovis_spec.compiler.names.references import Directory, arrow_of, resolve
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Connections
 from neurovis_spec.compiler.neurons.populate import Census
-from neurovis_spec.compiler.program import SPIKE
 from neurovis_spec.compiler.taken import Wired
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
@@ -96,17 +95,8 @@ class Connected:
             routes=tuple(one.route for one in bundles),
             synapses={number: one.synapse.definition for number, one in enumerate(bundles) if one.synapse is not None},
             rules={number: [own.rule for own in one.rules] for number, one in enumerate(bundles) if one.rules},
-            timed=self._timed,
+            timed=None if self.exact is None else np.asarray(self.exact.whole() > 0),
         )
-
-    @property
-    def _timed(self) -> BoolArray | None:
-        """The connections (m,) with a delay in seconds; None without any. Spikes come at the end of a step: where a
-        rule reads whether one has, the delay is of whole steps."""
-        if self.exact is None:
-            return None
-        reads = [any(f"pre.{SPIKE}" in own.rule.read for own in one.rules) for one in self.bundles]
-        return np.asarray((self.exact.whole() > 0) & ~np.repeat(np.array(reads, dtype=np.bool_), self.sizes))
 
 
 def connect(scopes: tuple[Scope, ...], census: Census, limits: Limits, seed: int) -> Connected:
