@@ -233,28 +233,12 @@ class _Integration:
     def changes(self, formula_: str) -> None:
         """x + the change; of all neurons state by state, since a branch within exprel then goes the same way in all."""
         for one in self.plan.states:
-            if self.varying[one.key] and one.use.definition.fires and self.method == "exponential":
-                self.changes_alike(one)
-                continue
             with self.code.block(self.code.loop("i", one.start + one.size, one.start)):
                 change: Value = "fk[i]"
                 if self.varying[one.key]:
                     h = self.length(one.use.definition.per_second)
                     change = self.code.value(formula(formula_), {"h": h, "f": "fk[i]", "j": "fj[i]"})
                 self.code.line(f"fx[i] = fx[i] + {self.code.text(change)};")
-
-    def changes_alike(self, one: FlowState) -> None:
-        """x + the change of a state of neurons that fire: how much its derivative changes with it is most often the
-        same for one after the other, those at rest apart, so that exprel need not be called anew."""
-        code, h = self.code, self.code.text(self.length(one.use.definition.per_second))
-        with code.block(""):
-            of, by = code.variable("j", math.nan), code.variable("h", 0.0)
-            with code.block(code.loop("i", one.start + one.size, one.start)):
-                with code.block(f"if (!(fj[i] == {of}))"):
-                    code.line(f"{of} = fj[i];")
-                    factor = code.value(formula("h*exprel(h*min(j, 0))"), {"h": h, "j": of})
-                    code.line(f"{by} = {code.text(factor)};")
-                code.line(f"fx[i] = fx[i] + {by}*fk[i];")
 
     def heun(self) -> None:
         """x + h/2·(f₁ + f₂)."""
