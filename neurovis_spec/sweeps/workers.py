@@ -173,6 +173,7 @@ def on_cluster(job: Job, points: Sequence[Point], address: str) -> Generator[tup
     """Points on the workers of a scheduler. Raises SweepError where it does not answer, or workers lack NeuroVis."""
     try:
         from distributed import Client, Future, KilledWorker, as_completed
+        from distributed.comm import CommClosedError
     except ImportError:
         hint = "pip install 'neurovis-spec[cluster]'"
         raise SweepError("a sweep on a cluster needs dask.distributed, which is not installed", hint) from None
@@ -197,7 +198,10 @@ def on_cluster(job: Job, points: Sequence[Point], address: str) -> Generator[tup
                 yield futures.pop(future), result
                 future.release()
         except Exception as error:  # of whatever kind: run_point raises nothing, so it is one of the cluster's
-            message = f"the cluster gave up: {' '.join(str(error).split()) or type(error).__name__}"
+            why = " ".join(str(error).split()) or type(error).__name__
+            if isinstance(error, CommClosedError):  # while a result was fetched: the client does not say with whom
+                why = f"the client lost the connection to the scheduler: {why}"
+            message = f"the cluster gave up: {why}"
             raise SweepError(
                 message, "the rows until then are kept; do all of its workers have this version?"
             ) from None
