@@ -131,5 +131,5 @@ def _compiled(source: str | Path, file: str, request: Request) -> CompiledNetwor
         span = Span(file, 1, 1, 1, 2)
         raise SpecError((Diagnostic("internal", "no network came out, and no finding says why", span),))
     return CompiledNetwork(
-        network, spec, request, findings.sorted(), dict(findings.sources), memory, frozenset(findings.files)
+        network, spec, request, findings.sorted(), dict(findings.sources), memory, dict(findings.files)
     )

@@ -8,7 +8,7 @@ checked, without it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,8 +40,8 @@ class Compilation:
     sources: Mapping[str, str]
     #: the earlier layout that the spec names (``layout.file``)
     memory: Layout | None = None
-    #: the files that the spec names, of data, included, and of the layout
-    files: frozenset[Path] = frozenset()
+    #: the files that the spec names, of data, included, and of the layout, with what was found in them by looking
+    files: Mapping[Path, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

@@ -229,7 +229,7 @@ class CompiledNetwork(Compilation):
             network = compile_spec(self.spec, request, findings)
         findings.check()
         assert network is not None
-        files, sources = self.files | findings.files, dict(findings.sources)
+        files, sources = {**self.files, **findings.files}, dict(findings.sources)
         return replace(self, request=request, network=network, sources=sources, files=files)
 
     def refusal(self) -> Diagnostic | None:

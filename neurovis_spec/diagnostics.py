@@ -101,8 +101,8 @@ class Findings:
     """
 
     sources: dict[str, str] = field(default_factory=dict)
-    #: the files that an author names, as far as they were looked for
-    files: set[Path] = field(default_factory=set)
+    #: the files that an author names, as far as they were looked for, with what was found in them by looking
+    files: dict[Path, str] = field(default_factory=dict)
     _told: dict[Mark, Diagnostic] = field(default_factory=dict)
     #: the names that findings miss
     _undeclared: dict[Mark, Undeclared] = field(default_factory=dict)
@@ -147,7 +147,7 @@ class Findings:
 
     def take(self, others: Findings) -> None:
         """Report what others have noted."""
-        self.files |= others.files
+        self.files |= {path: found or self.files.get(path, "") for path, found in others.files.items()}
         self._unread |= others._unread
         for (_, _, key), item in others._told.items():
             self._add(item, key)

@@ -11,21 +11,25 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from neurovis_spec.compiler.compile import Request
+from neurovis_spec.compiler.connections.edges import EdgeColumns
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.edge_list import EdgeTable
 from neurovis_spec.language.data.files import NamedFile, read_edges, read_table
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.modules import INCLUDED
 from neurovis_spec.language.spec import Spec
-from neurovis_spec.language.unknown import UNKNOWN
-from neurovis_spec.language.yaml.source import AnyList, Node, Scalar
+from neurovis_spec.language.tables import EdgeFile, EdgesField, columns_of_edges, edge_column
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
+from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, one_or_more
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
+_EDGES: Final[TypeAdapter[object]] = TypeAdapter(EdgesField)
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 
 
@@ -68,18 +72,22 @@ class _Reader:
     def __init__(self, root: Path, findings: Findings) -> None:
         self._root, self._findings = root, findings
         self.inlined = False
+        #: columns of edges that settings may name, at a connection that has some
+        self._columns: EdgeColumns | None = None
 
     def mapping(self, node: SourceMapping, folder: Path, path: tuple[str, ...]) -> dict[str, Plain]:
         """A mapping, in its order."""
         if path[-2:-1] == ("inputs",) and node.get("file") is not None:
             rest = {e.name: self.value(e.value, folder, path) for e in node.entries if e.name not in ("file", "key")}
             return {**rest, "values": self._table(node, folder)}
+        around, self._columns = self._columns, self._columns_of(node, folder) or self._columns
         result: dict[str, Plain] = {}
         for entry in node.entries:
             if (path == ("layout",) and entry.name == "file") or (not path and entry.name == "body"):
                 self.inlined = True
                 continue
             result[entry.name] = self.value(entry.value, folder, (*path, entry.name))
+        self._columns = around
         return result
 
     def value(self, node: Node, folder: Path, path: tuple[str, ...]) -> Plain:
@@ -89,6 +97,10 @@ class _Reader:
                 return self._table(node, folder)
             if path and path[-1] == "edges" and node.get("file") is not None:
                 return self._edges(node, folder)
+            if self._columns is not None and node.get("column") is not None:
+                column = edge_column(node, self._findings)
+                values = UNKNOWN if column is UNKNOWN else self._columns.value(column, self._findings)
+                return None if values is UNKNOWN else [*map(float, values)]
             return self.mapping(node, folder, path)
         if isinstance(node, AnyList):
             return [self.value(item, folder, path) for item in node.items]
@@ -111,8 +123,25 @@ class _Reader:
         ]
 
     def _edges(self, node: SourceMapping, folder: Path) -> Plain:
-        edges = read_edges(self._named(node, folder), self._findings)
+        edges = self._read_edges(node, folder)
         return None if edges is UNKNOWN else list(_rows(edges))
+
+    def _read_edges(self, node: Node, folder: Path, more: tuple[Located[str], ...] = ()) -> EdgeTable | Unknown:
+        written: object = _EDGES.validate_python(node, context=self._findings)
+        assert isinstance(written, EdgeFile)
+        assert isinstance(node, SourceMapping)
+        return read_edges(self._named(node, folder), self._findings, written=written._replace(more=more))
+
+    def _columns_of(self, body: SourceMapping, folder: Path) -> EdgeColumns | None:
+        """The columns of its edges that settings of a connection name; None where there are none."""
+        edges = body.get("edges")
+        if not isinstance(edges, SourceMapping):
+            return None
+        choices = [one for key in ("synapse", "plasticity") if (node := body.get(key)) for one in one_or_more(node)]
+        settings = [entry.value for one in choices if isinstance(one, SourceMapping) for entry in one.entries]
+        more = [name for one in settings if isinstance(one, SourceMapping) for name in columns_of_edges(one)]
+        table = self._read_edges(edges, folder, tuple({name.value: name for name in more}.values()))
+        return None if table is UNKNOWN else EdgeColumns.of(table)
 
 
 def _rows(edges: EdgeTable) -> Iterable[Plain]:

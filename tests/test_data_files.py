@@ -301,7 +301,7 @@ def test_edges_without_weights_have_weight_1(tmp_path: Path) -> None:
         ("from,weight\nA,1\n", "file-format", "no column 'to'", "from,to,weight"),
         ("from,to,to,weight\n", "file-format", "'to' is there twice", None),
         ("from,to,weight\nA,B\n", "file-format", "row 2 has 2 cells, the header 3", None),
-        ("source\ttarget\nA\tB\n", "file-format", "no column is called", "separated by commas"),
+        ("source\ttarget\nA\tB\n", "file-format", "no column is called 'source'", "columns: {from: NAME"),
         ("from,to,weight\nA,,1\n", "file-format", "row 2, column 2: the name", None),
         ("from,to,weight\nA,B,1\nA,B,nan\n", "not-finite", "row 3, column 3", "empty cell"),
         ("from,to,weight\nA,B,x\n", "file-format", "row 2, column 3: 'x' is no number", None),

@@ -20,8 +20,8 @@ from small_specs import HEAD, answer, network_of
 import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data import cells as data_files_cells
+from neurovis_spec.language.data import columns
 from neurovis_spec.language.data import csv_table as data_files_csv
-from neurovis_spec.language.data import edge_list
 from neurovis_spec.language.data.csv_table import parse_numbers
 from neurovis_spec.language.data.edge_list import parse_edges
 from neurovis_spec.language.data.files import CellError, NamedFile, locate, read_edges, read_table
@@ -239,7 +239,7 @@ def test_a_path_has_a_largest_length(tmp_path: Path) -> None:
 def test_names_of_any_length_are_told_apart(edges: list[tuple[str, str]], blank: str, places: int) -> None:
     text = "\n".join(["from,to", *(f"{source}{blank},{blank}{target}" for source, target in edges)])
     with (
-        patch.object(edge_list, "_PLACES", places),
+        patch.object(columns, "_PLACES", places),
         patch.object(data_files_cells, "STRETCH", 50),
     ):  # few places, so that names fall upon each other
         got = parse_edges([text.encode()])

@@ -6,6 +6,7 @@ of a small network (Eq. 11), the choices made and the hash.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
@@ -79,9 +80,17 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
     if network.body is not None:
         yield from _body(network, network.body)
     yield _matrix(network)
+    yield _files(compiled)
     choices = [("layout engine", *compiled.choose_engine()), ("backend", *compiled.choose_backend())]
     yield "choices\n" + table([(what, f"{name}: {why}") for what, name, why in choices])
     yield f"hash {network.hash}"
+
+
+def _files(compiled: CompiledNetwork) -> str:
+    """What was found in files by looking at them."""
+    base = compiled.request.base
+    found = [(os.path.relpath(path, base), about) for path, about in sorted(compiled.files.items()) if about]
+    return "files\n" + table(found) if found else ""
 
 
 def _head(network: Network) -> str:

@@ -121,7 +121,7 @@ def _all_sound(parts: Iterable[Path], given: Located[str], inside: Path, finding
     sizes: dict[Path, int] = {}
     for part in parts:
         real = real_path(part)
-        findings.files.add(real)
+        findings.files.setdefault(real, "")
         fault, hint = fault_of(real, LARGEST), None
         if not real.is_relative_to(inside) and real.exists():
             fault = FileFault("path-outside", "lies outside the folder of the spec")

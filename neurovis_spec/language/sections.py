@@ -61,17 +61,15 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model, Named, Short, entry_hint
 from neurovis_spec.language.patterns import PATTERNS, PatternField
+from neurovis_spec.language.tables import FILE, EdgesField, FileReference, as_file
 from neurovis_spec.language.units import TIME_ABOUTS, TIMES
 from neurovis_spec.language.values import (
-    FILE,
     ActivationField,
     AtPort,
     BiasField,
     CentreField,
     DelayField,
     DestinationsField,
-    EdgesField,
-    FileReference,
     InitialField,
     MatrixField,
     ModelField,
@@ -79,7 +77,6 @@ from neurovis_spec.language.values import (
     Pair,
     RulesField,
     SynapseField,
-    as_file,
     at_ports,
     pair,
 )

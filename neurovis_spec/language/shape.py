@@ -75,7 +75,7 @@ def read_library(document: SourceDocument, findings: Findings) -> Library | None
 def read_body(path: Path, findings: Findings) -> BodyModel | None:
     """The ``body`` section of a file, whatever else it holds: it may be another spec. What is invalid in it is
     reported; None where that is too much."""
-    findings.files.add(real_path(path))
+    findings.files.setdefault(real_path(path), "")
     document = read_file(path, str(path), findings)
     if document is None:
         return None

@@ -14,11 +14,9 @@ from pydantic import Field, ValidationInfo
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.grammar import (
     BOOL,
-    CELL,
     FORMULA,
     FORMULAS,
     GROUP,
-    NULL,
     PORT,
     REFERENCE,
     REFERENCES,
@@ -34,7 +32,6 @@ from neurovis_spec.language.grammar import (
     Map,
     Plain,
     Role,
-    Row,
     Shape,
     declaring,
     words,
@@ -62,7 +59,8 @@ from neurovis_spec.language.located import (
     refuse,
     value_or,
 )
-from neurovis_spec.language.model import Model, NamedParameters, Short, opening
+from neurovis_spec.language.model import Model, NamedParameters, Short
+from neurovis_spec.language.tables import CELL_OF_ROWS, FILE, OF_EDGES, FileReference, as_file, file_hint
 from neurovis_spec.language.units import Seconds, measured
 from neurovis_spec.language.words import Combine
 from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, Sequence, one_or_more
@@ -142,7 +140,9 @@ def _of_sources(value: Role) -> Map:
 
 ActivationField = Annotated[Choice, Leaf(as_choice, _choice("activation", GROUP)), Role("choice", "activation")]
 ModelField = Annotated[Choice, Leaf(as_choice, _choice("model", GROUP)), Role("choice", "model")]
-SynapseField = Annotated[Choice, Leaf(as_choice, _choice("synapse", SYNAPSE_SETTING)), Role("choice", "synapse")]
+SynapseField = Annotated[
+    Choice, Leaf(as_choice, _choice("synapse", SYNAPSE_SETTING, OF_EDGES)), Role("choice", "synapse")
+]
 
 
 def as_choices(node: Node, info: ValidationInfo) -> tuple[Choice, ...]:
@@ -152,22 +152,10 @@ def as_choices(node: Node, info: ValidationInfo) -> tuple[Choice, ...]:
     return tuple(as_choice(item, info) for item in one_or_more(node))
 
 
-_RULE: Final = _choice("rule", RULE_SETTING, _of_sources(RULE_SETTING))
+_RULE: Final = _choice("rule", RULE_SETTING, _of_sources(RULE_SETTING), OF_EDGES)
 RulesField = Annotated[
     tuple[Choice, ...], Leaf(as_choices, Either((_RULE, ListOf(_RULE, least=1)))), Role("choice", "rule")
 ]
-
-
-class FileReference(NamedTuple):
-    """``{file: path}``; ``key`` names the array of an archive."""
-
-    path: Located[str]
-    key: Located[str] | None
-    span: Span
-
-
-#: How the names of files end that hold a table of numbers.
-DATA_FILES: Final = (".csv", ".npy", ".npz", ".mtx")
 
 
 class MatrixRows(NamedTuple):
@@ -184,31 +172,12 @@ class MatrixRows(NamedTuple):
 Matrix: TypeAlias = MatrixRows | FileReference
 
 
-def as_file(node: Mapping, info: ValidationInfo) -> FileReference:
-    """``{file: path, key: name}``."""
-    keys = read_keys(node, FILE.known, findings_of(info))
-    node = keys.mapping
-    path = node.get("file")
-    if path is None:
-        if keys.lack("file"):
-            findings_of(info).error("missing-key", opening(node), "the key 'file' is missing", "write {file: PATH}")
-        give_up()
-    key = node.get("key")
-    return FileReference(as_text(path, info), None if key is None else as_text(key, info), node.span)
-
-
-def _file_hint(node: Node) -> str | None:
-    """How a file is named whose path stands in its place."""
-    path = node.value if isinstance(node, Scalar) else None
-    return f"write {{file: {path}}}" if isinstance(path, str) and path.endswith(DATA_FILES) else None
-
-
 def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
     """A list of rows, or a file."""
     if isinstance(node, Mapping):
         return as_file(node, info)
     if not isinstance(node, AnyList):
-        refuse(info, node, "a list of rows, or {file: …}", _file_hint(node))
+        refuse(info, node, "a list of rows, or {file: …}", file_hint(node))
     rows = node.items if isinstance(node, Sequence) else (node.cell(0),) if node.rows is None else ()
     for row in rows:
         if not isinstance(row, AnyList):
@@ -216,41 +185,9 @@ def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
     return MatrixRows(node)
 
 
-#: ``{file: path}``.
-FILE: Final = Map(
-    {
-        "file": Key(UNNAMED, "A file, by its path relative to this one.", required=True),
-        "key": Key(UNNAMED, "The name of the array in an archive."),
-    }
-)
-_WEIGHT: Final = Either((Plain(FORMULA.written, CELL, formula=True), NULL))
-_END: Final = Plain({"type": "string", "pattern": "\\S"}, REFERENCES)
-_EDGE: Final = Row((_END, _END, _WEIGHT, FORMULA), least=2)
-_ROWS: Final = ListOf(ListOf(_WEIGHT))
+_ROWS: Final = ListOf(ListOf(CELL_OF_ROWS))
 
 MatrixField = Annotated[Matrix, Leaf(as_matrix, Either((_ROWS, FILE)))]
-
-
-class EdgeRows(NamedTuple):
-    """Edges as written: ``[from, to, weight, delay]``, the last two optional (checked when they are connected)."""
-
-    node: AnyList
-
-
-def as_edges(node: Node, info: ValidationInfo) -> EdgeRows | FileReference:
-    """A list of edges, or a file."""
-    if isinstance(node, Mapping):
-        return as_file(node, info)
-    if not isinstance(node, AnyList):
-        refuse(info, node, "a list of edges [from, to, weight], or {file: …}", _file_hint(node))
-    rows = node.items[:1] if isinstance(node, Sequence) else (node.cell(0),) if node.rows is None else ()
-    for row in rows:
-        if not isinstance(row, AnyList):
-            refuse(info, row, "an edge, that is a list", "edges are a list of lists: [[A, B, 0.5], [A, C, 1]]")
-    return EdgeRows(node)
-
-
-EdgesField = Annotated[EdgeRows | FileReference, Leaf(as_edges, Either((ListOf(_EDGE), FILE)))]
 
 
 def as_centre(node: Node, info: ValidationInfo) -> Formula | Matrix:

@@ -1,7 +1,8 @@
 """Edge lists: ``[from, to, weight, delay]`` rows, from the spec or from a file.
 
 In: rows as written or a file, the neurons of both ends. Out: positions within the ends, weights and delays (none where
-an edge names none), in the order written. Long plain lists go from the reader's packed arrays straight into arrays.
+an edge names none), in the order written; of a file further columns that settings name. Long plain lists go from the
+reader's packed arrays straight into arrays.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,13 +22,16 @@ from neurovis_spec.compiler.values.cells import Cells, cells_of, seen_by_pairs, 
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Span, shorten
+from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import time_of
+from neurovis_spec.language.tables import EdgeColumn, EdgeFile, EdgeRows
 from neurovis_spec.language.units import Seconds
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
-from neurovis_spec.language.values import EdgeRows, FileReference
 from neurovis_spec.language.yaml.source import NULL, TEXT
 from neurovis_spec.likeness import suggest
+
+if TYPE_CHECKING:
+    from neurovis_spec.language.data.edge_list import EdgeTable
 
 _AN_EDGE = "an edge is [from, to], [from, to, weight] or [from, to, weight, delay]"
 
@@ -39,6 +43,41 @@ class EdgeList(NamedTuple):
     j: Indices
     weights: FloatArray
     delays: Delays
+    #: of edges of a file what else is read of it
+    columns: EdgeColumns | None = None
+
+
+class EdgeColumns(NamedTuple):
+    """Columns of a file of edges, one number a connection, NaN where a cell is empty. ``rows`` are those of the file,
+    ``places`` says which column each is, from 1."""
+
+    values: Mapping[str, FloatArray]
+    rows: Indices
+    places: Mapping[str, int]
+
+    @staticmethod
+    def of(table: EdgeTable) -> EdgeColumns | None:
+        """Those of a file; None where nobody named any."""
+        return EdgeColumns(table.more, narrow(table.rows()), table.columns) if table.more else None
+
+    def at(self, kept: IntArray) -> EdgeColumns:
+        """Those of some connections, in this order."""
+        values = {name: values[kept] for name, values in self.values.items()}
+        return self._replace(values=values, rows=self.rows[kept])
+
+    def value(self, wanted: EdgeColumn, findings: Findings) -> FloatArray | Unknown:
+        """One of them; UNKNOWN where cells are empty that must not be, which is reported."""
+        values = self.values[wanted.name.value]
+        empty = np.flatnonzero(np.isnan(values))
+        if not len(empty):
+            return values
+        if wanted.default is None:
+            for place in empty[:PATIENCE].tolist():
+                at = f"row {self.rows[place]}, column {self.places[wanted.name.value]} of the file"
+                hint = "fill it in, or write a default: {column: NAME, default: NUMBER}"
+                findings.error("file-format", wanted.span, f"{at} is empty", hint, key=place)
+            return UNKNOWN
+        return np.where(np.isnan(values), wanted.default, values)
 
 
 @dataclass(frozen=True)
@@ -87,9 +126,9 @@ class EdgeReader:
     #: how many connections may be made; None where that is not known
     most: int | None = None
 
-    def read(self, edges: EdgeRows | FileReference) -> EdgeList | Unknown:
+    def read(self, edges: EdgeRows | EdgeFile) -> EdgeList | Unknown:
         """All edges; UNKNOWN where one is invalid."""
-        if isinstance(edges, FileReference):
+        if isinstance(edges, EdgeFile):
             return self._from_file(edges)
         if len(edges.node) == 0:
             self.constants.findings.error("wrong-size", edges.node.span, "there is no edge in this list")
@@ -193,11 +232,11 @@ class EdgeReader:
         key = (what, where) if where else None
         self.constants.findings.error("edge-outside", span, message, hint, key=key, undeclared=lost)
 
-    def _from_file(self, reference: FileReference) -> EdgeList | Unknown:
-        table = self.files.edges(reference, self.most)
+    def _from_file(self, written: EdgeFile) -> EdgeList | Unknown:
+        table = self.files.edges(written, self.most)
         if table is UNKNOWN:
             return UNKNOWN
-        span = reference.path.span
+        span = written.file.path.span
         if not len(table) and table.fault is None:
             self.constants.findings.error("wrong-size", span, "there is no edge in this file")
             return UNKNOWN
@@ -217,4 +256,4 @@ class EdgeReader:
             given = UNKNOWN if timed is UNKNOWN else timed.over(Delays(delays))
         if i is UNKNOWN or j is UNKNOWN or long or table.fault is not None or given is UNKNOWN:
             return UNKNOWN
-        return EdgeList(i, j, table.weights, given)
+        return EdgeList(i, j, table.weights, given, EdgeColumns.of(table))

@@ -11,7 +11,7 @@ does: weights that are scaled together are one Scaled, what depends on positions
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -20,7 +20,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, narrow
 from neurovis_spec.compiler.connections.delays import DelayReader, Delays, Timed, check_below_step, text_of
-from neurovis_spec.compiler.connections.edges import EdgeReader, End
+from neurovis_spec.compiler.connections.edges import EdgeColumns, EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends, counted
 from neurovis_spec.compiler.connections.in_use import InUse, Joined, in_use
 from neurovis_spec.compiler.connections.patterns import all_to_all, drawn_alone, empty_reason, pairs_of
@@ -49,9 +49,10 @@ from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.tables import EdgeFile, FileReference, columns_of_edges, edge_column
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
-from neurovis_spec.language.values import Delay, FileReference, MatrixRows
-from neurovis_spec.language.yaml.source import Scalar
+from neurovis_spec.language.values import Delay, MatrixRows
+from neurovis_spec.language.yaml.source import Mapping, Scalar
 from neurovis_spec.likeness import suggest
 
 #: Keys of a body that say which connections there are.
@@ -135,6 +136,8 @@ class _Shape(NamedTuple):
     delays: Delays | None = None
     #: which of its weights follow parameters
     parts: tuple[Part, ...] = ()
+    #: what else a file of edges says of each
+    columns: EdgeColumns | None = None
 
     @property
     def has_delay(self) -> BoolArray:
@@ -148,7 +151,8 @@ class _Shape(NamedTuple):
         place_of = np.full(len(self.i), -1, dtype=np.int64)
         place_of[kept] = np.arange(len(kept))
         parts = tuple(_moved_to(part, place_of[part.within(len(self.i))]) for part in self.parts)
-        return _Shape(self.i[kept], self.j[kept], weights, delays, parts)
+        columns = None if self.columns is None else self.columns.at(kept)
+        return _Shape(self.i[kept], self.j[kept], weights, delays, parts, columns)
 
 
 class EntryContext(NamedTuple):
@@ -459,9 +463,35 @@ class EntryBuilder:
         reader = EdgeReader(
             sources, targets, self.constants, self.context.scope.files, self._stream("weight"), self.context.room
         )
+        written = self.body.edges
+        if isinstance(written, EdgeFile):
+            written = written._replace(more=self._further_columns())
         with self.constants.following() as parts:
-            edges = reader.read(self.body.edges)
-        return UNKNOWN if edges is UNKNOWN else _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts))
+            edges = reader.read(written)
+        if edges is UNKNOWN:
+            return UNKNOWN
+        return _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts), edges.columns)
+
+    def _further_columns(self) -> tuple[Located[str], ...]:
+        """The columns of the edges that settings of the synapse and of the rules name, each once."""
+        choices = *self.body.plasticity, *(() if self.body.synapse is None else (self.body.synapse,))
+        found = (name for choice in choices for name in columns_of_edges(choice.settings))
+        return tuple({name.value: name for name in found}.values())
+
+    def _table(self, shape: _Shape | Unknown) -> Callable[[Mapping], FloatArray | Unknown]:
+        """What a mapping means as the value of a setting of connections: a column of their edges."""
+
+        def value(node: Mapping) -> FloatArray | Unknown:
+            column, findings = edge_column(node, self.constants.findings), self.constants.findings
+            if column is UNKNOWN or not self._is_sound("edges"):
+                return UNKNOWN
+            if not isinstance(self.body.edges, EdgeFile):
+                message = "'column' is one of the file of an entry's edges, and this entry has none"
+                findings.error("useless-key", node.span, message, "write edges: {file: …}")
+                return UNKNOWN
+            return UNKNOWN if shape is UNKNOWN or shape.columns is None else shape.columns.value(column, findings)
+
+        return value
 
     def _written_delays(self, shape: _Shape | Unknown) -> Delays | Unknown | None:
         """What the entry says of its delays, of every pair; None where it says nothing. The structure depends on it."""
@@ -687,6 +717,7 @@ class EntryBuilder:
             scope=self.context.scope,
             directory=self.context.directory,
             census=self.context.census,
+            table=self._table(shape),
         )
         rules = rules_of(self.body.plasticity, place)
         if rules is not UNKNOWN:
@@ -722,7 +753,11 @@ class EntryBuilder:
             hint = "leave the synapse out, or let the targets combine by sum or product"
             self.constants.findings.error("synapse-at-distance", choice.name.span, message, hint)
         ends = self._connection_ends(shape)
-        each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if ends is UNKNOWN else ends._asdict())
+        each = Each(
+            "connection",
+            dict.fromkeys(_SETTING.sees, UNKNOWN) if ends is UNKNOWN else ends._asdict(),
+            self._table(shape),
+        )
         count = UNKNOWN if ends is UNKNOWN else len(ends.i)
         settled = settled_of(choice, SYNAPSE, self.context.scope.definitions, self.constants, each, count)
         if settled is UNKNOWN or not settled.sound or not check_initials(settled, choice, self.constants):

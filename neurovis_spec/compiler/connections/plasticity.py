@@ -74,7 +74,7 @@ def _are_apart(choices: tuple[Choice, ...], found: list[Learning | Unknown], fin
 def _learning_of(choice: Choice, at: Place) -> Learning | Unknown:
     """A rule of an entry; UNKNOWN where it is invalid."""
     constants, ends = at.scope.constants, at.ends
-    each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if ends is UNKNOWN else ends._asdict())
+    each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if ends is UNKNOWN else ends._asdict(), at.table)
     count = UNKNOWN if ends is UNKNOWN else len(ends.j)
     settled = settled_of(choice, RULE, at.scope.definitions, constants, each, count)
     if settled is UNKNOWN:

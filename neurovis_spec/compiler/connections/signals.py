@@ -6,12 +6,12 @@ In: what is written: neurons, groups, states and outputs of these, inputs; one f
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import BoolArray, Indices, IntArray
+from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray
 from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.names.references import Directory, few, resolve_end, resolve_part
 from neurovis_spec.compiler.names.scope import Scope
@@ -68,6 +68,8 @@ class Place(NamedTuple):
     scope: Scope
     directory: Directory
     census: Census
+    #: what a mapping means as the value of a setting
+    table: Callable[[Written], FloatArray | Unknown] | None = None
 
     @property
     def findings(self) -> Findings:

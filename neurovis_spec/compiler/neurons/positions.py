@@ -21,8 +21,9 @@ from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import formula_of
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.tables import FileReference
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
-from neurovis_spec.language.values import FLAT, FileReference
+from neurovis_spec.language.values import FLAT
 from neurovis_spec.language.yaml.source import TEXT, AnyList, Scalar, Sequence
 
 _POSITION = formula_at(GroupModel, "position", 0)

@@ -18,14 +18,14 @@ from neurovis_spec.compiler.network import Input, Spikes
 from neurovis_spec.compiler.values.cells import Cells, cells_of, values_of
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
-from neurovis_spec.diagnostics import Findings, listed, shorten
-from neurovis_spec.language.data.table import Table, printable
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.data.columns import no_column
+from neurovis_spec.language.data.table import Table
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.sections import InputModel, SpikesModel
 from neurovis_spec.language.units import TIMES
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.source import AnyList
-from neurovis_spec.likeness import suggest
 
 _NEGATIVE = "a spike is at 0 or later, this is at {:.15g}"
 
@@ -140,9 +140,6 @@ def _column(
     wanted = key if written is None else written.value
     if wanted in table.header:
         return table.header.index(wanted)
-    span = path.span if written is None else written.span
-    there = listed([f"'{printable(name)}'" for name in table.header])
-    hint = suggest(wanted, table.header) or (f"write columns: {{{key}: NAME}}" if written is None else None)
-    message = f"the file has no column '{shorten(wanted)}'; its columns are {there}"
-    findings.error("file-format", span, message, hint)
+    error = no_column(table.header, wanted, path if written is None else written)
+    findings.error(error.code, path.span if error.span is None else error.span, str(error), error.hint)
     return UNKNOWN

@@ -6,7 +6,7 @@ every parameter, one for each of n neurons or connections (Each), of which the i
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Final, NamedTuple
 
@@ -25,6 +25,7 @@ from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.language.keys import settings_of
 from neurovis_spec.language.located import IDENTIFIER, Formula, Located, formula_of, in_unit
+from neurovis_spec.language.tables import is_from_table
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import AnyList, Entry, Scalar, one_or_more
@@ -54,6 +55,8 @@ class Each(NamedTuple):
 
     noun: str
     names: Mapping[str, int | IntArray | Unknown]
+    #: what a mapping means as the value of a setting: values from a table
+    table: Callable[[Written], FloatArray | Unknown] | None = None
 
     def extra(self, one: int | None = None) -> dict[str, Value | Unknown]:
         """The values of the names, for all or for one."""
@@ -251,6 +254,8 @@ def _setting(
     entry: Entry | Unknown, default: Default, n: int | Unknown, constants: Constants, each: Each
 ) -> FloatArray | Unknown:
     """The value of a parameter that is set; a number with a unit is one in that of the parameter."""
+    if entry is not UNKNOWN and each.table is not None and is_from_table(entry.value):
+        return each.table(entry.value)
     formulas = UNKNOWN if entry is UNKNOWN else _formulas(entry, default.unit, constants)
     return UNKNOWN if formulas is UNKNOWN else spread(formulas, n, constants, f"'{default.name}'", each=each)
 

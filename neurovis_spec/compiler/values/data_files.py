@@ -15,8 +15,8 @@ from neurovis_spec.compiler.limits import amount
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.data.files import CellError, NamedFile, Room, Table, read_edges, read_table
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.tables import EdgeFile, FileReference
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
-from neurovis_spec.language.values import FileReference
 
 if TYPE_CHECKING:
     from neurovis_spec.language.data.edge_list import EdgeTable
@@ -107,9 +107,9 @@ class Files:
             return UNKNOWN
         return self.table(FileReference(path, None, path.span), full="a spike needs a number everywhere", keyed=False)
 
-    def edges(self, reference: FileReference, most: int | None = None) -> EdgeTable | Unknown:
-        """The edges of a ``.csv`` file, at most so many."""
-        path, key = reference.path, reference.key
+    def edges(self, written: EdgeFile, most: int | None = None) -> EdgeTable | Unknown:
+        """The edges of a file of text, at most so many."""
+        path, key = written.file.path, written.file.key
 
         def room(edges: int) -> None:
             if most is not None and edges > most:
@@ -117,6 +117,6 @@ class Files:
                 raise CellError("too-many", message, "raise the limit with --limit")
 
         def read(room: Room) -> EdgeTable | Unknown:
-            return read_edges(self._named(reference), self.findings, room=room)
+            return read_edges(self._named(written.file), self.findings, written=written, room=room)
 
-        return self._edges.get((path.value, None if key is None else key.value), most, room, read)
+        return self._edges.get((path.value, None if key is None else key.value, written.what), most, room, read)

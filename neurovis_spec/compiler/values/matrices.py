@@ -18,8 +18,9 @@ from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.functions import DRAWS
+from neurovis_spec.language.tables import FileReference
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
-from neurovis_spec.language.values import FileReference, Matrix, MatrixRows
+from neurovis_spec.language.values import Matrix, MatrixRows
 from neurovis_spec.language.yaml.source import NULL
 
 

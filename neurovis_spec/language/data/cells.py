@@ -1,7 +1,8 @@
-"""The rows and cells of a ``.csv`` file, and the numbers in them.
+"""The rows and cells of a file of text, such as a ``.csv``, and the numbers in them.
 
 In: bytes, in parts. Out: rows of texts; float64 numbers, NaN for an empty cell. A fault is a CellError that names row
-and column as an editor or a spreadsheet counts them (from 1, the header included).
+and column as an editor or a spreadsheet counts them (from 1, the header included). What separates cells is a Separator,
+commas if nothing else is said.
 """
 
 from __future__ import annotations
@@ -26,9 +27,55 @@ LONGEST_CELL: Final = 1 << 16
 STRETCH: Final = 1 << 16
 _NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _NOT_FINITE: Final = re.compile(r"[-+]?\.?(?:nan|inf|infinity)", re.IGNORECASE)
-_SEPARATOR: Final = re.compile(rb"[,\n]")
+_QUOTED: Final = re.compile(rb'"[^"]*"?')
+_BLANKS: Final = re.compile(rb"[ \t]+")
+_AROUND: Final = re.compile(rb" ?\n ?")
+_DECIMAL_COMMA: Final = re.compile(r"[-+]?[0-9]+,[0-9]+")
 #: what numbers and blanks consist of
 PLAIN: Final = b"0123456789+-.eE \t"
+
+
+class Separator(NamedTuple):
+    """What stands between the cells of a row: a byte, and what it is called."""
+
+    byte: bytes
+    noun: str
+
+    @property
+    def blank(self) -> bool:
+        """Whether several of them are one."""
+        return self.byte == b" "
+
+    def between(self, line: bytes) -> int:
+        """How many there are in a line, outside of quotes."""
+        line = _QUOTED.sub(b'""', line) if b'"' in line else line
+        return max(len(line.split()) - 1, 0) if self.blank else line.count(self.byte)
+
+
+COMMAS: Final = Separator(b",", "commas")
+TABS: Final = Separator(b"\t", "tabs")
+SEMICOLONS: Final = Separator(b";", "semicolons")
+BLANKS: Final = Separator(b" ", "blanks")
+#: lines of a file in which its separator is looked for
+_LOOKED_AT: Final = 3
+
+
+def separator_of(parts: Iterable[bytes], path: str) -> Separator:
+    """What separates the cells of a file: what the first lines have equally often. It is looked for in this order:
+    commas (of a ``.tsv`` tabs), tabs, semicolons, blanks; where nothing is found it is the first of these.
+
+    >>> [separator_of([text], "x.csv").noun for text in (b"a;b\\n0,5;1\\n", b"a b\\n1  2\\n", b"my column\\n1\\n")]
+    ['semicolons', 'blanks', 'commas']
+    """
+    known = (COMMAS, TABS, SEMICOLONS, BLANKS)
+    if path.lower().endswith(".tsv"):
+        known = (TABS, COMMAS, SEMICOLONS, BLANKS)
+    lines = [line for line in next(iter(text_of(parts))).split(b"\n", _LOOKED_AT)[:_LOOKED_AT] if line]
+    for separator in known:
+        counts = {separator.between(line) for line in lines}
+        if len(counts) == 1 and 0 not in counts:
+            return separator
+    return known[0]
 
 
 class Row(NamedTuple):
@@ -73,9 +120,15 @@ def stretches_of(parts: Iterable[bytes]) -> Iterator[bytes]:
     yield stretch
 
 
-def text_of(parts: Iterable[bytes]) -> Iterator[bytes]:
-    """The stretches of a file of text, whose lines may end in any way, without a byte-order mark."""
-    return stretches_of(_with_line_feeds(parts))
+def text_of(parts: Iterable[bytes], separator: Separator = COMMAS) -> Iterator[bytes]:
+    """The stretches of a file of text, whose lines may end in any way, without a byte-order mark; of several blanks
+    that separate cells one is left, and none around a line."""
+    stretches = stretches_of(_with_line_feeds(parts))
+    return map(_squeezed, stretches) if separator.blank else stretches
+
+
+def _squeezed(lines: bytes) -> bytes:
+    return _AROUND.sub(b"\n", _BLANKS.sub(b" ", lines)).strip(b" ")
 
 
 def _with_line_feeds(parts: Iterable[bytes]) -> Iterator[bytes]:
@@ -96,11 +149,11 @@ def count_lines(text: Iterable[bytes]) -> int:
     return sum(lines.count(b"\n") + 1 for lines in text) - 1
 
 
-def check_text(text: Iterable[bytes]) -> None:
+def check_text(text: Iterable[bytes], separator: Separator = COMMAS) -> None:
     """Refuse what is empty, or no text, or has a cell that is longer than any number or name. Raises CellError."""
     number, broken, empty = 1, 0, True
     for lines in text:
-        _check_lengths(lines, number)
+        _check_lengths(lines, number, separator.byte)
         broken = broken or _broken_row(lines, number)
         number, empty = number + lines.count(b"\n") + 1, empty and not lines
     if empty:
@@ -120,32 +173,34 @@ def _broken_row(lines: bytes, number: int) -> int:
     return 0
 
 
-def _check_lengths(lines: bytes, number: int) -> None:
+def _check_lengths(lines: bytes, number: int, separator: bytes) -> None:
     """Refuse a cell that is longer than any number or name. It covers a stretch of half its length that holds no
     separator; few stretches have none. Raises CellError."""
     half = LONGEST_CELL // 2
+    separators = re.compile(b"[" + separator + b"\n]")
     for start in range(0, len(lines) - half, half):
-        if _SEPARATOR.search(lines, start, start + half):
+        if separators.search(lines, start, start + half):
             continue
         low, high = max(0, start - LONGEST_CELL), start + LONGEST_CELL + half
-        begin = max(low, lines.rfind(b",", low, start) + 1, lines.rfind(b"\n", low, start) + 1)
-        end = _SEPARATOR.search(lines, start + half, high)
+        begin = max(low, lines.rfind(separator, low, start) + 1, lines.rfind(b"\n", low, start) + 1)
+        end = separators.search(lines, start + half, high)
         if (min(len(lines), high) if end is None else end.start()) - begin > LONGEST_CELL:
             row, line = number + lines.count(b"\n", 0, begin), lines.rfind(b"\n", 0, begin) + 1
-            column = lines.count(b",", line, begin) + 1
+            column = lines.count(separator, line, begin) + 1
             raise in_cell(row, column, f"no number or name has more than {LONGEST_CELL:,} bytes")
 
 
-def first_row(text: Iterator[bytes]) -> Row:
+def first_row(text: Iterator[bytes], separator: Separator = COMMAS) -> Row:
     """The first row of a text. Raises CellError."""
     lines = next(text)
-    return next(rows_of(b"\n".join((lines, *text)) if b'"' in lines else lines))
+    return next(rows_of(b"\n".join((lines, *text)) if b'"' in lines else lines, separator=separator))
 
 
-def rows_of(lines: bytes, number: int = 1) -> Iterator[Row]:
+def rows_of(lines: bytes, number: int = 1, separator: Separator = COMMAS) -> Iterator[Row]:
     """The rows of lines, of which the first has this number; an empty line is a row of one empty cell. Raises
     CellError."""
-    reader = csv.reader(io.TextIOWrapper(io.BytesIO(lines + b"\n"), "utf-8", newline=""), strict=True)
+    text = io.TextIOWrapper(io.BytesIO(lines + b"\n"), "utf-8", newline="")
+    reader = csv.reader(text, strict=True, delimiter=separator.byte.decode())
     try:
         for cells in reader:
             yield Row(number - 1 + reader.line_num, cells or [""])
@@ -211,7 +266,9 @@ def number_of(cell: str, row: int, column: int) -> float:
 
 
 def separated(cell: str) -> str | None:
-    """A hint, where a cell seems to be several that something else than commas separates."""
+    """A hint, where a cell seems to be several that something else than commas separates, or has a decimal comma."""
+    if _DECIMAL_COMMA.fullmatch(cell):
+        return f"numbers have a decimal point: write {cell.replace(',', '.')}"
     return "columns are separated by commas" if ";" in cell or "\t" in cell else None
 
 

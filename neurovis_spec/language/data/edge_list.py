@@ -1,25 +1,28 @@
-"""Lists of edges from the bytes of a ``.csv`` file.
+"""Lists of edges from the bytes of a file of text.
 
-In: bytes, in parts, which are let go as they are read. Out: EdgeTable. A fault is a CellError that names row and
-column, from 1, the header included. Rows are taken many at a time, column by column; they are checked one by one only
-among the few where something is wrong.
+In: bytes, in parts, which are let go as they are read; what its columns are called, and which rows count. Out:
+EdgeTable. A fault is a CellError that names row and column, from 1, the header included. Rows are taken many at a time,
+column by column; they are checked one by one only among the few where something is wrong.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from array import array
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, Indices, IntColumn, integers, narrow
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, IntColumn, integers, narrow
 from neurovis_spec.language.data.cells import (
+    COMMAS,
     NO_COMMENT,
     Row,
+    Separator,
     below,
     check_text,
     count_lines,
@@ -27,31 +30,40 @@ from neurovis_spec.language.data.cells import (
     first_row,
     given_up,
     number_of,
-    numbers_of,
     rows_of,
     separated,
+    separator_of,
     strip_end,
     text_of,
 )
+from neurovis_spec.language.data.columns import (
+    Lines,
+    Names,
+    Picked,
+    find_column,
+    lines_of,
+    no_column,
+    picked,
+    rows_picked,
+)
 from neurovis_spec.language.data.table import CellError, Faults, Room, in_cell, in_row, quoted
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.tables import EdgeFile
+from neurovis_spec.language.units import TIMES
 from neurovis_spec.likeness import nearest
 
 _COLUMNS: Final = ("from", "to", "weight", "delay", "delay_seconds")
 _LARGEST_DELAY: Final = 2**31 - 1
-#: cells of the first row; a header has five at most, and a few more may be a mistake to be named
+#: cells of the first row; a header of our own has five at most, and a few more may be a mistake to be named
 _MOST_CELLS: Final = 100
-_NO_MARKS: Final = bytes(set(range(256)) - set(b",\n"))
-#: names are looked up by so many words of eight bytes, at one of so many places
-_WORDS: Final = 4
-_PLACES: Final = 1 << 19
-#: spellings of names for which there is room at first
-_FIRST_ROOM: Final = 1 << 10
-#: what of a word belongs to a name of which so many bytes are left
-_MASKS: Final = np.array([(1 << 8 * size) - 1 for size in range(9)], dtype=np.uint64)
-#: odd numbers that spread words over places (the golden ratio's, as in Knuth 6.4, and powers of it)
-_SPREAD: Final = [np.uint64(pow(0x9E3779B97F4A7C15, power, 1 << 64)) for power in range(1, _WORDS + 1)]
+#: columns of a file of others
+MOST_COLUMNS: Final = 1000
 _HINT: Final = "the first row is 'from,to', 'from,to,weight' or 'from,to,weight,delay'"
-_ALL: Final = "the columns are from, to, weight and perhaps delay or delay_seconds"
+_ALL: Final = (
+    "the columns are from, to, weight and perhaps delay or delay_seconds; if they are called otherwise, write columns: "
+    "{from: NAME, to: NAME}"
+)
+_WITH_UNIT: Final = "of times, write delay: {column: NAME, unit: ms}"
 #: the columns of numbers
 _NUMBERS: Final = _COLUMNS[2:]
 
@@ -72,6 +84,11 @@ class EdgeTable:
     offsets: IntColumn
     fault: CellError | None = None
     seconds: FloatArray | None = None
+    #: further columns of numbers, NaN where a cell is empty, by their names, and where these stand, from 1
+    more: Mapping[str, FloatArray] = field(default_factory=dict)
+    columns: Mapping[str, int] = field(default_factory=dict)
+    #: what was found by looking at the file, in words; nothing of one as we write them
+    about: str = ""
 
     def __len__(self) -> int:
         return len(self.begins)
@@ -79,6 +96,10 @@ class EdgeTable:
     def row(self, edge: int) -> int:
         """The row of the file in which an edge stands, from 1."""
         return edge + int(self.offsets[edge])
+
+    def rows(self) -> IntArray:
+        """The row of each edge."""
+        return np.arange(len(self)) + self.offsets.whole()
 
     @property
     def sources(self) -> tuple[str, ...]:
@@ -91,33 +112,94 @@ class EdgeTable:
         return tuple(map(self.names.__getitem__, self.ends.tolist()))
 
 
-def parse_edges(parts: list[bytes], room: Room | None = None) -> EdgeTable:
-    """EdgeTable from rows whose first one names the columns, in any order. ``room`` is asked with the number of edges
-    before any is made. Raises CellError where not a row is invalid but the header, or the file as a whole."""
+class Written(NamedTuple):
+    """How edges stand in a file: its header, where each column that is wanted stands, by what it is for (its name,
+    after "column ", of those that others read), the factor that makes its delays seconds, and which rows count."""
+
+    header: Sequence[str]
+    places: dict[str, int]
+    separator: Separator = COMMAS
+    unit: str | None = None
+    picked: tuple[Picked, ...] = ()
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """What the columns of numbers are for."""
+        return (*_NUMBERS, *(name for name in self.places if name.startswith(MORE)))
+
+    def about(self, edges: int, rows: int) -> str:
+        """What was found, in words, where so many edges were read of so many rows."""
+        parts = [] if self.separator == COMMAS else [f"separated by {self.separator.noun}"]
+        if self.picked:
+            parts.append(f"{edges:,} of {rows:,} rows")
+        return ", ".join(parts)
+
+    @property
+    def factor(self) -> Fraction:
+        """What makes its delays seconds."""
+        return TIMES[self.unit or "s"]
+
+
+#: what stands before the name of a column that is of no own use to edges
+MORE: Final = "column "
+
+
+def parse_edges(parts: list[bytes], room: Room | None = None, file: EdgeFile | None = None) -> EdgeTable:
+    """EdgeTable from rows whose first one names the columns, in any order, perhaps as a ``file`` says. ``room`` is
+    asked with the number of edges before any is made. Raises CellError where not a row is invalid but the header, or
+    the file as a whole."""
     strip_end(parts)
+    separator = separator_of(parts, "" if file is None else file.file.path.value) if parts else COMMAS
     most = count_lines(text_of(parts))
-    if room is not None:
+    if room is not None and not (file and file.where):  # else it is asked while rows are taken
         room(most)
-    check_text(text_of(parts))
-    cells = 1 + next(text_of(parts)).partition(b"\n")[0].count(b",")
-    if cells > _MOST_CELLS:
+    check_text(text_of(parts, separator), separator)
+    cells = 1 + next(text_of(parts, separator)).partition(b"\n")[0].count(separator.byte)
+    if cells > (MOST_COLUMNS if file else _MOST_CELLS):
         raise in_row(1, f"has {cells:,} cells", _HINT)
-    first = first_row(text_of(parts))
-    reader = _Reader(_columns(first.stripped().cells), most)
-    try:
-        for number, lines in below(text_of(given_up(parts)), first.number):
-            reader.take(lines, number)
-            if reader.faults.many:
-                break
-    except CellError as error:
-        reader.faults.note(error)
+    first = first_row(text_of(parts, separator), separator)
+    written = written_of(first.stripped().cells, file, separator)
+    reader = _Reader(written, min(most, 1 + sum(map(len, parts)) // len(written.header)))
+    for number, lines in below(text_of(given_up(parts), separator), first.number):
+        if not reader.goes_on(lines, number):
+            break
+        if room is not None:
+            room(reader.count)
     return reader.table()
 
 
-def _columns(header: list[str]) -> dict[str, int]:
-    """Where each column stands. Raises CellError."""
+def written_of(header: list[str], file: EdgeFile | None, separator: Separator) -> Written:
+    """Where each column stands that is wanted. Raises CellError."""
+    if file is None:
+        return Written(header, _columns(header, ()), separator)
+    others = {*(one.column.value for one in file.where), *(name.value for name in file.more)}
+    places = _columns(header, others) if file.columns is None else _called(header, dict(file.columns), file.unit)
+    further = {f"{MORE}{name.value}": find_column(header, name) for name in file.more}
+    unit = None if file.unit is None else file.unit.value
+    return Written(header, {**places, **further}, separator, unit, picked(file.where, header))
+
+
+def _called(header: list[str], names: dict[str, Located[str]], unit: Located[str] | None) -> dict[str, int]:
+    """Where the columns stand that are called by these names, or else as ours are. Raises CellError."""
+    places: dict[str, int] = {}
+    ours = [cell.casefold() for cell in header]
+    for what in _COLUMNS:
+        name = names.get("delay" if what == "delay_seconds" else what)
+        if name is not None and (what not in ("delay", "delay_seconds") or (what == "delay") == (unit is None)):
+            places[what] = find_column(header, name)
+        elif name is None and ours.count(what) == 1:
+            places[what] = ours.index(what)
+        elif name is None and what in ("from", "to"):
+            raise no_column(header, what, None, f"write columns: {{{what}: NAME}}")
+    return places
+
+
+def _columns(header: list[str], others: Collection[str]) -> dict[str, int]:
+    """Where each column stands, of a file whose columns have our names, beside ``others``. Raises CellError."""
     names = [cell.casefold() for cell in header]
     for column, name in enumerate(names, 1):
+        if header[column - 1] in others and name not in _COLUMNS:
+            continue
         if name not in _COLUMNS:
             close = nearest(name, _COLUMNS, 1)
             hint = f"did you mean '{close[0]}'?" if close else _ALL
@@ -131,87 +213,7 @@ def _columns(header: list[str]) -> dict[str, int]:
     missing = [name for name in _COLUMNS[:2] if name not in names]
     if missing:
         raise CellError("file-format", f"there is no column '{missing[0]}'", _HINT)
-    return {name: column for column, name in enumerate(names)}
-
-
-class _Cells(NamedTuple):
-    """A column of some lines: the bytes of these, with room behind them, and where the cells begin and end."""
-
-    text: npt.NDArray[np.uint8]
-    begins: npt.NDArray[np.int64]
-    ends: npt.NDArray[np.int64]
-
-    def words(self) -> list[npt.NDArray[np.uint64]]:
-        """The cells in words of eight bytes, as far as these go."""
-        at_all = np.ndarray((len(self.text) - 7,), dtype="<u8", buffer=self.text, strides=(1,))
-        sizes = self.ends - self.begins
-        used = min(_WORDS, max(1, -(-int(sizes.max()) // 8)))
-        return [at_all[self.begins + 8 * n] & _MASKS[np.clip(sizes - 8 * n, 0, 8)] for n in range(used)]
-
-    def joined(self) -> bytes:
-        """The cells, with commas between them."""
-        steps = np.zeros(len(self.text) + 1, dtype=np.int8)
-        steps[self.begins] = 1
-        steps[self.ends + 1] -= 1
-        return self.text[np.cumsum(steps[:-1], dtype=np.int8).view(np.bool_)].tobytes().replace(b"\n", b",")[:-1]
-
-
-class _Names:
-    """The numbers of names, in the order in which they come; blanks around a name do not count, an empty one has −1.
-
-    Many cells are looked up at once, by their bytes, in a table with one place for all spellings that fall on it: which
-    came first has it, the others are looked up one by one, as is each when it comes first."""
-
-    def __init__(self) -> None:
-        self.known: list[str] = []
-        self._numbers: dict[str, int] = {"": -1}
-        #: which spelling is at each place; 0: none
-        self._at = np.zeros(_PLACES, dtype=np.int32)
-        #: of each spelling at a place its words, and the number of the name
-        self._words = np.zeros((_WORDS, _FIRST_ROOM), dtype=np.uint64)
-        self._number = np.full(_FIRST_ROOM, -1, dtype=np.int32)
-        self._spellings = 1
-        #: the most words that any name has
-        self._most = 0
-
-    def __getitem__(self, written: str) -> int:
-        name = written.strip()
-        number = self._numbers.setdefault(name, len(self.known))
-        if number == len(self.known):
-            self.known.append(name)
-        return number
-
-    def of(self, cells: _Cells) -> npt.NDArray[np.int32]:
-        """The number of the name in each cell."""
-        words = cells.words()
-        mixed = words[0] * _SPREAD[0]
-        for word, spread in zip(words[1:], _SPREAD[1:], strict=False):
-            mixed += word * spread
-        places = (mixed >> np.uint64(64 - _PLACES.bit_length() + 1)).astype(np.int64)
-        spellings = self._at[places]
-        numbers = self._number[spellings]
-        other = (numbers < 0) | (cells.ends - cells.begins > 8 * _WORDS)
-        self._most = max(self._most, len(words))
-        for word, held in itertools.zip_longest(words, self._words[: self._most]):
-            other |= held[spellings] != (0 if word is None else word)
-        for cell in np.flatnonzero(other).tolist():
-            written = cells.text[cells.begins[cell] : cells.ends[cell]].tobytes()
-            number, place = self[written.decode("utf-8")], int(places[cell])
-            numbers[cell] = number
-            if number >= 0 and len(written) <= 8 * _WORDS and not self._at[place]:
-                self._at[place] = self._spelling([word[cell] for word in words], number)
-        return numbers
-
-    def _spelling(self, words: list[np.uint64], number: int) -> int:
-        """Keep a spelling of the name of this number, by its words."""
-        kept = self._spellings
-        if kept == len(self._number):  # twice the room
-            self._words = np.concatenate((self._words, np.zeros_like(self._words)), axis=1)
-            self._number = np.concatenate((self._number, self._number))
-        self._words[: len(words), kept] = words
-        self._number[kept] = number
-        self._spellings += 1
-        return kept
+    return {name: names.index(name) for name in _COLUMNS if name in names}
 
 
 def _in_brief(numbers: npt.NDArray[Any]) -> Indices:
@@ -231,104 +233,124 @@ def _are_delays(steps: FloatArray, seconds: FloatArray) -> bool:
 class _Reader:
     """Takes the rows after the header, and gives the table of all of them; what is wrong with them is reported."""
 
-    def __init__(self, places: dict[str, int], most: int) -> None:
+    def __init__(self, written: Written, most: int) -> None:
         """``most``: how many edges there may be."""
         self.faults = Faults()
-        self._places = places
-        self._names = _Names()
-        self._count = 0
+        self._written = written
+        self._places = written.places
+        self._names = Names()
+        self.count = 0
+        self._rows = 0
         self._begins, self._ends = np.empty(most, dtype=np.int32), np.empty(most, dtype=np.int32)
-        self._weights = np.empty(most)
-        self._seconds = np.empty(most) if "delay_seconds" in places else None
+        self._numbers = {name: np.empty(most) for name in written.numbers if name in ("weight", *written.places)}
         #: those of some edges after the other
         self._delays: list[Indices] = []
         self._offsets: list[Indices] = []
-        #: edges that were taken one by one since: where they begin and end, weight, delay, that in seconds, row
+        #: edges that were taken one by one since: where they begin and end, row, numbers
         self._singles = array("d")
 
     def table(self) -> EdgeTable:
         """The table of all rows taken so far."""
         self._add_singles()
+        if self.faults.first() is None:
+            for one in self._written.picked:
+                one.check()
+        numbers = {name: values[: self.count] for name, values in self._numbers.items()}
         return EdgeTable(
             names=tuple(self._names.known),
-            begins=narrow(self._begins[: self._count]),
-            ends=narrow(self._ends[: self._count]),
-            weights=self._weights[: self._count],
+            begins=narrow(self._begins[: self.count]),
+            ends=narrow(self._ends[: self.count]),
+            weights=numbers["weight"],
             delays=integers(*self._delays),
             offsets=integers(*self._offsets),
             fault=self.faults.first(),
-            seconds=None if self._seconds is None else self._seconds[: self._count],
+            seconds=_in_seconds(numbers.get("delay_seconds"), self._written.factor),
+            more={name.removeprefix(MORE): values for name, values in numbers.items() if name.startswith(MORE)},
+            about=self._written.about(self.count, self._rows),
+            columns={name.removeprefix(MORE): place + 1 for name, place in self._places.items()},
         )
 
-    def _add(self, *columns: npt.NDArray[Any]) -> None:
-        """Add edges: where they begin and end, weights, delays, those in seconds, rows."""
-        begins, ends, weights, delays, seconds, rows = columns
-        at = slice(self._count, self._count + len(rows))
-        self._begins[at], self._ends[at], self._weights[at] = begins, ends, weights
-        if self._seconds is not None:
-            self._seconds[at] = seconds
-        self._delays.append(_in_brief(delays))
+    def _add(self, begins: npt.NDArray[Any], ends: npt.NDArray[Any], rows: IntArray, *numbers: FloatArray) -> None:
+        """Add edges: where they begin and end, rows, numbers; NaN where one is not given."""
+        at = slice(self.count, self.count + len(rows))
+        self._begins[at], self._ends[at] = begins, ends
+        for name, values in zip(self._written.numbers, numbers, strict=True):
+            if name == "weight":
+                values = np.where(np.isnan(values), 1.0, values)
+            if name in self._numbers:
+                self._numbers[name][at] = values
+            if name == "delay":
+                self._delays.append(_in_brief(np.where(np.isnan(values), -1.0, values)))
         self._offsets.append(_in_brief(rows - np.arange(at.start, at.stop)))
-        self._count = at.stop
+        self.count = at.stop
 
     def _add_singles(self) -> None:
         """Add what was taken one by one."""
         if self._singles:
-            self._add(*np.array(self._singles).reshape(-1, 6).T)
+            begins, ends, rows, *numbers = np.array(self._singles).reshape(-1, 3 + len(self._written.numbers)).T
+            self._add(begins, ends, rows.astype(np.int64), *numbers)
             del self._singles[:]
 
-    def take(self, lines: bytes, number: int) -> None:
+    def goes_on(self, lines: bytes, number: int) -> bool:
+        """Take lines, of which the first has this number; False where there is no reading on."""
+        try:
+            self._take(lines, number)
+        except CellError as error:
+            self.faults.note(error)
+            return False
+        return not self.faults.many
+
+    def _take(self, lines: bytes, number: int) -> None:
         """Take lines, of which the first has this number. Raises CellError where there is no reading on."""
-        width, marks = len(self._places), lines.translate(None, _NO_MARKS) + b"\n"
-        count = len(marks) // width
-        if b'"' not in lines and marks == (b"," * (width - 1) + b"\n") * count:
-            text = np.frombuffer(lines + b"\n" + bytes(8 * _WORDS), dtype=np.uint8)
-            ends = np.flatnonzero((text == ord(",")) | (text == ord("\n")))
-            begins = np.concatenate(([0], ends[:-1] + 1))
-            columns = {name: _Cells(text, begins[at::width], ends[at::width]) for name, at in self._places.items()}
-            if self._quickly(columns, number, count):
-                return
-        for row in rows_of(lines, number):
+        self._rows = number + lines.count(b"\n") - 1
+        some = lines_of(lines, len(self._written.header), self._written.separator.byte)
+        if some is not None and self._quickly(some, number):
+            return
+        for row in rows_of(lines, number, self._written.separator):
             self._one(row.stripped())
             if self.faults.many:
                 return
 
-    def _quickly(self, columns: dict[str, _Cells], number: int, count: int) -> bool:
+    def _quickly(self, lines: Lines, number: int) -> bool:
         """Take rows, column by column; False, and none is taken, where one of them is invalid or may be."""
-        found = [
-            numbers_of(columns[name].joined()) if name in columns else np.broadcast_to(np.nan, (count,))
-            for name in _NUMBERS
-        ]
+        chosen = rows_picked(self._written.picked, lines)
+        rows = np.arange(len(lines)) if chosen is None else chosen
+        columns = {name: lines.column(at) for name, at in self._places.items()}
+        if chosen is not None:
+            columns = {name: cells.some(chosen) for name, cells in columns.items()}
+        absent = np.broadcast_to(np.nan, (len(rows),))
+        found = [columns[name].numbers() if name in columns else absent for name in self._written.numbers]
         numbers = [one for one in found if one is not None]
-        if len(numbers) < len(found) or not _are_delays(*numbers[1:]):
+        if len(numbers) < len(found) or not _are_delays(*numbers[1:3]):
             return False
         begins, ends = self._names.of(columns["from"]), self._names.of(columns["to"])
-        if min(begins.min(), ends.min()) < 0:
+        if len(rows) and min(begins.min(), ends.min()) < 0:
             return False
-        weights, steps, seconds = numbers
-        weights, steps = np.where(np.isnan(weights), 1.0, weights), np.where(np.isnan(steps), -1.0, steps)
         self._add_singles()
-        self._add(begins, ends, weights, steps, seconds, np.arange(number, number + count))
+        if len(rows):
+            self._add(begins, ends, number + rows, *numbers)
         return True
 
     def _one(self, row: Row) -> None:
         """Take one row, or what of it is in order."""
         number, cells = row
-        if len(cells) != len(self._places):
-            self.faults.note(in_row(number, f"has {counted(len(cells))}, the header {len(self._places)}"))
+        if len(cells) != len(self._written.header):
+            self.faults.note(in_row(number, f"has {counted(len(cells))}, the header {len(self._written.header)}"))
+            return
+        takes = [one.takes(cells[one.at]) for one in self._written.picked]  # each sees each row
+        if not all(takes):
             return
         ends = [cells[self._places[end]] for end in ("from", "to")]
         for column in sorted(self._places[end] for end in ("from", "to")):
             if not cells[column]:
                 self.faults.note(in_cell(number, column + 1, "the name of a neuron is wanted"))
-        weight, steps, seconds = (self._number(number, cells, name) for name in _NUMBERS)
-        if not (math.isnan(steps) or math.isnan(seconds)):
+        numbers = [self._number(number, cells, name) for name in self._written.numbers]
+        if not any(map(math.isnan, numbers[1:3])):
             column = self._places["delay_seconds"] + 1
             self.faults.note(in_cell(number, column, "a delay in steps stands in this row, too"))
         if all(ends):
             begin, end = (self._names[name] for name in ends)
-            weight, steps = 1.0 if math.isnan(weight) else weight, -1.0 if math.isnan(steps) else steps
-            self._singles.extend((begin, end, weight, steps, seconds, number))
+            self._singles.extend((begin, end, number, *numbers))
 
     def _number(self, row: int, cells: list[str], name: str) -> float:
         """What a row has in the column of this name; NaN where that is nothing, or invalid, which is reported."""
@@ -338,10 +360,19 @@ class _Reader:
         try:
             value = number_of(cells[column], row, column + 1)
             if name == "delay" and not math.isnan(value) and not (value.is_integer() and 0 <= value <= _LARGEST_DELAY):
-                raise in_cell(row, column + 1, f"{quoted(cells[column])} is no delay (0, 1, 2, … steps)")
+                hint = None if self._written.header[column].casefold() == "delay" else _WITH_UNIT
+                raise in_cell(row, column + 1, f"{quoted(cells[column])} is no delay (0, 1, 2, … steps)", hint)
             if name == "delay_seconds" and value < 0:
-                raise in_cell(row, column + 1, f"{quoted(cells[column])} is no delay: it is at least 0 seconds")
+                least = f"0 {self._written.unit or 'seconds'}"
+                raise in_cell(row, column + 1, f"{quoted(cells[column])} is no delay: it is at least {least}")
         except CellError as error:
             self.faults.note(error)
             return math.nan
         return value
+
+
+def _in_seconds(times: FloatArray | None, factor: Fraction) -> FloatArray | None:
+    """Times in seconds, each rounded once."""
+    if times is None or factor == 1:
+        return times
+    return times * factor.numerator if factor > 1 else times / factor.denominator

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full, in_cell
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.tables import DATA_FILES, TEXT_FILES, EdgeFile
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
-from neurovis_spec.language.values import DATA_FILES
 from neurovis_spec.language.yaml.opening import FileFault, read_parts
 from neurovis_spec.likeness import suggest
 from neurovis_spec.real_paths import real_path
@@ -75,7 +75,7 @@ def locate(file: NamedFile, findings: Findings) -> Path | Unknown:
         hint = "data lies in the folder of the main spec or below it (--root names another folder)"
         findings.error("path-outside", span, f"the path '{shown}' leaves the folder of the spec", hint)
         return UNKNOWN
-    findings.files.add(path)
+    findings.files.setdefault(path, "")
     return path
 
 
@@ -169,32 +169,45 @@ def _parsed(suffix: str, data: bytes, key: str | None, room: Room | None) -> Tab
     return parse_npz(data, key, room)
 
 
-def read_edges(file: NamedFile, findings: Findings, *, room: Room | None = None) -> EdgeTable | Unknown:
-    """A list of edges from a ``.csv`` file whose header names the columns from, to, weight and perhaps delay.
+def read_edges(
+    named: NamedFile, findings: Findings, *, written: EdgeFile | None = None, room: Room | None = None
+) -> EdgeTable | Unknown:
+    """A list of edges from a file of text whose header names the columns from, to, weight and perhaps delay, or what is
+    ``written`` that they are called.
 
     An empty weight is 1, an empty delay −1; a key is refused; ``room`` may refuse so many edges before they are
     made. Where rows are invalid, these are reported, and the table has a ``fault``. Codes: those of ``read_data`` and
     of ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``useless-key``.
     """
-    if Path(file.path).suffix.lower() != ".csv":
-        findings.error("file-format", file.span, f"edges are read from a .csv file, not from '{_short(file.path)}'")
+    if Path(named.path).suffix.lower() not in TEXT_FILES:
+        message = f"edges are read from a .csv file, not from '{_short(named.path)}'"
+        findings.error("file-format", named.span, message)
         return UNKNOWN
-    if file.key is not None:
-        _refuse_key(file.key, findings)
+    if named.key is not None:
+        _refuse_key(named.key, findings)
         return UNKNOWN
-    parts = _read_parts(file, findings, _PART)
+    parts = _read_parts(named, findings, _PART)
     if parts is UNKNOWN:
         return UNKNOWN
     from neurovis_spec.language.data.edge_list import parse_edges
 
     try:
-        table = parse_edges(parts, room)
+        table = parse_edges(parts, room, written)
     except CellError as error:
-        _refuse(error, file.path, file.span, findings)
+        _refuse(error, named.path, named.span, findings)
         return UNKNOWN
+    note(named, table.about, findings)
     if table.fault is not None:
-        _refuse(table.fault, file.path, file.span, findings)
+        _refuse(table.fault, named.path, named.span, findings)
     return table
+
+
+def note(named: NamedFile, about: str, findings: Findings) -> None:
+    """Keep what was found in a file by looking at it, for whoever asks what a network is made of."""
+    path = locate(named, Findings())
+    if about and path is not UNKNOWN:
+        before = findings.files.get(path)
+        findings.files[path] = about if not before or before == about else f"{before}; {about}"
 
 
 def _refuse_key(key: Located[str], findings: Findings) -> None:
@@ -210,7 +223,10 @@ def _refuse(
     for number, one in enumerate((error, *error.others)):
         hint = NO_GAP if one.hint == EMPTY_CELL and not gaps else one.hint
         if shown is None:
-            findings.error(one.code, span, f"the file '{_short(path_text)}': {one}", hint, key=number)
+            message, at = str(one), one.span or span
+            if one.span is None:
+                message = f"the file '{_short(path_text)}': {one}"
+            findings.error(one.code, at, message, hint, key=number)
         else:
             place = cell_at(shown, span.file, one.at) if any(one.at) else span
             findings.error(one.code, place, str(one), hint)

@@ -13,6 +13,8 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from neurovis_spec.diagnostics import Span
+
 #: a table has at most this many cells: 256 MiB in double precision
 MOST_CELLS: Final = 1 << 25
 #: faults of one file that are told
@@ -30,13 +32,22 @@ EMPTY_CELL: Final = "an empty cell means that there is none"
 
 class CellError(ValueError):
     """What is wrong with a file: a finding's code, a sentence that names the place, and perhaps a hint; of a file of
-    text also ``at``, the row or line and the column of the cell, from 1 (a column of 0: the whole row)."""
+    text also ``at``, the row or line and the column of the cell, from 1 (a column of 0: the whole row). ``span`` is
+    where it stands in the spec, if not at the path of the file."""
 
-    def __init__(self, code: str, message: str, hint: str | None = None, at: tuple[int, int] = (0, 0)) -> None:
+    def __init__(
+        self,
+        code: str,
+        message: str,
+        hint: str | None = None,
+        at: tuple[int, int] = (0, 0),
+        span: Span | None = None,
+    ) -> None:
         super().__init__(message)
         self.code = code
         self.hint = hint
         self.at = at
+        self.span = span
         #: what else is wrong with the file, in its order
         self.others: tuple[CellError, ...] = ()
 
