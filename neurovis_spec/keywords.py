@@ -60,6 +60,7 @@ class RunKeywords(KeepKeywords, total=False):
 
     backend: str | None
     start: Recording | None
+    only: Literal["weights"] | None
     until: str | Until | None
     progress: Progress | None
     checkpoint: str | Path | None
@@ -113,6 +114,7 @@ RUN: Final[RunKeywords] = {
     "backend": None,
     "every": 1,
     "start": None,
+    "only": None,
     "until": None,
     "progress": None,
     "states": (),
@@ -193,6 +195,8 @@ def course_of(
 
     check(backend=given["backend"], start=given["start"], progress=given["progress"], inputs=inputs)
     until, checkpoint = given["until"], given["checkpoint"]
+    if given["only"] not in (None, "weights"):
+        raise ValueError(f"only is 'weights' or None, not {given['only']!r}")
     if isinstance(until, str):
         until = Until(until, network)
     elif until is not None:
@@ -203,6 +207,7 @@ def course_of(
         inputs=inputs,
         backend=given["backend"],
         start=given["start"],
+        weights_alone=given["only"] is not None,
         until=until,
         keep=keep_of(given, given["last"]),
         checkpoint=None if checkpoint is None else arguments.path("checkpoint", checkpoint),

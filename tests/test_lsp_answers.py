@@ -141,6 +141,10 @@ def offered(text: str) -> dict[str, Completion]:
         (BASE + "ros: {subscribe: {go: {type: geometry_msgs/Twist, field: ¦", ["linear.x"], ["linear", "data"]),
         (BASE + "ros: {subscribe: {go: {on_timeout: ¦", ["hold", "zero", "stop"], ["go"]),
         (BASE + "outputs: {o: K}\nros: {publish: {o: {¦", ["topic", "field", "safe"], ["timeout"]),
+        (BASE + "events: [{at: 1, set: {¦", ["alpha", "K", "O"], ["go"]),
+        (BASE + "events: [{at: 1, set: {K -> ¦", ["K", "O"], ["alpha"]),
+        (BASE + "events: [{at: 1, feed: {¦", ["go"], ["alpha", "K"]),
+        (BASE + "events: [{at: 1, reset: ¦", ["K", "O"], ["alpha", "go"]),
         ("description: |\n  ¦", [], ["name"]),
         ("neurons:\n  K: {count: 3,\n  O: {activation: ta¦", ["tanh"], ["count"]),
         ('parameters:\n  alpha: 1\n  p: "al¦pha"', ["alpha"], ["p"]),
@@ -388,6 +392,18 @@ def test_synapses_are_explained(at: str, told: list[str]) -> None:
     found = hover(*marked(COUPLED.replace(at.replace("¦", ""), at, 1)))
     assert found is not None
     assert all(one in found.markdown for one in told), found.markdown
+
+
+def test_what_events_set_and_feed_is_renamed() -> None:
+    text = (
+        BASE
+        + "connections: {K -> O: 1}\nevents:\n  - {at: 1, set: {alpha: 2, K2 -> O: alpha}, feed: {go: 1}, reset: [O]}\n"
+    )
+    assert renamed(text.replace("{al¦pha", "{alpha").replace("set: {alpha", "set: {al¦pha"), "b") == text.replace(
+        "alpha", "b"
+    )
+    assert renamed(text.replace("K2 -> O", "K2 -> O¦"), "P").count("P") == 4
+    assert renamed(text.replace("feed: {go", "feed: {g¦o"), "h") == text.replace("go", "h")
 
 
 def test_what_is_read_of_the_ends_leads_to_the_model_and_is_renamed_with_it() -> None:

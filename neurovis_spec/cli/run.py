@@ -49,6 +49,7 @@ class Keeping:
 
     every: int
     start: str | None
+    only: Literal["weights"] | None
     states: tuple[str, ...]
     neurons: tuple[str, ...]
     weights: Literal["plastic", "none"]
@@ -62,6 +63,7 @@ class Keeping:
             "backend": backend,
             "every": self.every,
             "start": recording_of(self.start),
+            "only": self.only,
             "until": None if self.until is None else network.until(self.until),
             "states": self.states,
             "neurons": self.neurons,
@@ -78,6 +80,11 @@ keeping_options: Final = as_one(
         "--every", type=click.IntRange(1, 2**53), default=1, metavar="K", help="Record every K-th step only; default 1."
     ),
     start_option,
+    click.option(
+        "--only",
+        type=click.Choice(["weights"]),
+        help="With --from take nothing but the weights of connections that learn: a new trial.",
+    ),
     click.option(
         "--states",
         metavar="REF",
@@ -151,6 +158,7 @@ checking_option: Final = as_one(
         "neurovis run first.yaml --steps 4000 --set gain=0.5 -o first.npz",
         "neurovis run first.yaml --input touch=touch.csv --every 10 -o first.csv",
         "neurovis run first.yaml --from first.npz -o second.npz",
+        "neurovis run first.yaml --from first.npz --only weights -o second.npz",
         'neurovis run first.yaml --steps 100000 --until "rms(O, last=100) < 0.01"',
         "neurovis run first.yaml --steps 500 --check-step",
         "neurovis run --backend list",
@@ -181,6 +189,8 @@ def command(spec: str, running: Running, keeping: Keeping, checking: Checking, o
     between what flows), and what it reaches, has no order.
     """
     checking.check(keeping, output)
+    if keeping.only is not None and keeping.start is None:
+        raise click.UsageError("--only says what is taken of a recording: give one with --from")
     network = _network(spec, running, keeping, output)
     steps, arrays = running.steps, tables(running.inputs, network.network)
     if checking.step:

@@ -152,7 +152,7 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
     order = _order(connected, census, inputs, noises, findings)
     valid = connected.complete and findings.errors == before
     if order is None or not valid or not _signals_fit(connected.bundles, len(census.neurons), findings):
-        _read_events(spec, finder, constants)  # for its findings alone
+        _read_events(spec, finder, inputs, constants)  # for its findings alone
         return None
     return _Sections(
         declared=declared,
@@ -311,20 +311,20 @@ def _eventful(spec: Spec, network: Network, finder: Finder, constants: Constants
     from neurovis_spec.compiler.events.timeline import with_changes
 
     before = constants.findings.errors
-    events = _read_events(spec, finder, constants)
+    events = _read_events(spec, finder, network.inputs, constants)
     if constants.findings.errors > before:
         return None
     changed = with_changes(network, events, constants)
     return None if constants.findings.errors > before else changed
 
 
-def _read_events(spec: Spec, finder: Finder, constants: Constants) -> tuple[Event, ...]:
+def _read_events(spec: Spec, finder: Finder, inputs: tuple[Input, ...], constants: Constants) -> tuple[Event, ...]:
     """The events of a spec. Most specs have none: nothing that reads them is imported then."""
     if not spec.events:
         return ()
     from neurovis_spec.compiler.events.events import EventReader
 
-    return EventReader(finder, constants).read(spec.events)
+    return EventReader(finder, constants, {entry.name: entry for entry in inputs}).read(spec.events)
 
 
 def _report_no_neurons(spec: Spec, census: Census, findings: Findings) -> None:

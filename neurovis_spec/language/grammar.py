@@ -28,7 +28,8 @@ Kind: TypeAlias = Literal[
     "synapse",
     "local",
 ]
-#: What a text is for. A ``choice`` names a definition, a ``setting`` one of its parameters or signals.
+#: What a text is for. A ``choice`` names a definition, a ``setting`` one of its parameters or signals, a ``settable`` a
+#: parameter, or connections.
 Use: TypeAlias = Literal[
     "declares",
     "names",
@@ -36,6 +37,7 @@ Use: TypeAlias = Literal[
     "template",
     "ends",
     "references",
+    "settable",
     "choice",
     "setting",
     "setting value",
@@ -110,6 +112,8 @@ SENT: Final = Role("sent")
 #: References to neurons; the ends of a connection, FROM -> TO, or neurons.
 REFERENCES: Final = Role("references")
 ENDS: Final = Role("ends")
+#: What an event sets: a parameter, or the weights of connections.
+SETTABLE: Final = Role("settable")
 
 
 def declaring(kind: Kind) -> Role:

@@ -29,6 +29,7 @@ from neurovis_spec.language.grammar import (
     REFERENCES,
     RUN_EACH,
     SENT,
+    SETTABLE,
     TEXT,
     TWO,
     AsTable,
@@ -47,7 +48,6 @@ from neurovis_spec.language.located import (
     FormulaField,
     Leaf,
     Located,
-    MeasuredField,
     NamesField,
     PartsField,
     TextField,
@@ -59,7 +59,7 @@ from neurovis_spec.language.located import (
     valid,
     words,
 )
-from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model, Named, Short, entry_hint
+from neurovis_spec.language.model import Filled, Keyed, Model, Named, Short, entry_hint
 from neurovis_spec.language.patterns import PATTERNS, PatternField
 from neurovis_spec.language.tables import FILE, EdgesField, FileReference, as_file
 from neurovis_spec.language.units import TIME_ABOUTS, TIMES
@@ -70,12 +70,14 @@ from neurovis_spec.language.values import (
     CentreField,
     DelayField,
     DestinationsField,
+    FeedField,
     InitialField,
     MatrixField,
     ModelField,
     NoiseField,
     Pair,
     RulesField,
+    SetField,
     SynapseField,
     at_ports,
     pair,
@@ -437,11 +439,13 @@ class EventModel(Model):
         **dict.fromkeys(("hold", "fix"), "clamp"),
         **dict.fromkeys(("restore", "heal", "repair"), "mend"),
         **dict.fromkeys(("until", "end"), "to"),
+        **dict.fromkeys(("input", "inputs", "drive"), "feed"),
+        **dict.fromkeys(("restart", "clear"), "reset"),
     }
     ONE_OF: ClassVar[OneOf | None] = OneOf(
-        ("set", "clamp", "lesion", "mend", "learning"),
+        ("set", "feed", "clamp", "reset", "lesion", "mend", "learning"),
         "this event does nothing",
-        "give it set, clamp, lesion, mend or learning",
+        "give it set, feed, clamp, reset, lesion, mend or learning",
         "bad-event",
     )
 
@@ -462,15 +466,19 @@ class EventModel(Model):
         TimeField | None,
         Needs(("from", "clamp"), "'to' is the end of a clamp, all else takes 'at' alone", "remove 'to'", "bad-event"),
     ] = Field(None, description="The step, or the time, before which a clamp ends; without it, it lasts.")
-    set: Annotated[Keyed[MeasuredField], KeysAreNames(), Filled("{parameter: value}"), naming("parameter"), _AT] = (
-        Field(default_factory=dict, description="{parameter: value} from this step on.")
+    set: Annotated[Keyed[SetField], Filled("{parameter: value}"), SETTABLE, _AT] = Field(
+        default_factory=dict,
+        description="{parameter: value} from this step on; {FROM -> TO: weight} of connections, or a list of weights.",
+    )
+    feed: Annotated[Keyed[FeedField], Filled("{input: value}"), naming("input"), _AT] = Field(
+        default_factory=dict, description="{input: value} in place of its source, until it is fed anew; null ends it."
     )
     clamp: Annotated[
         Keyed[FormulaField],
         Filled("{neurons: activity}"),
         REFERENCES,
         NotWith(
-            ("set", "lesion", "mend", "learning"),
+            ("set", "feed", "reset", "lesion", "mend", "learning"),
             "a clamp is an event of its own",
             "make it an entry of its own",
             "bad-event",
@@ -479,6 +487,9 @@ class EventModel(Model):
     ] = Field(
         default_factory=dict,
         description="{neurons: activity}, or {K.v: value of the state v}, {(K -> O).g: of a synapse's or rule's}.",
+    )
+    reset: Annotated[PartsField, Filled("a neuron"), REFERENCES, _AT] = Field(
+        default=(), description="Neurons that go back to their beginning; weights stay."
     )
     lesion: Annotated[PartsField, Filled("a neuron or a connection"), ENDS, _AT] = Field(
         default=(), description="Neurons and connections (FROM -> TO) that are removed."

@@ -17,6 +17,7 @@ from neurovis_spec.language.grammar import (
     FORMULA,
     FORMULAS,
     GROUP,
+    NULL,
     PORT,
     REFERENCE,
     REFERENCES,
@@ -265,6 +266,11 @@ def as_all_measured(node: Node, info: ValidationInfo) -> Formula | FormulaList:
     return as_measured(node, info)
 
 
+def as_feed(node: Node, info: ValidationInfo) -> Formula | FormulaList | None:
+    """What an input is fed: a formula, a list with one for each of its numbers, or null for nothing any more."""
+    return None if isinstance(node, Scalar) and node.value is None else as_formulas(node, info)
+
+
 def all_in_unit(formulas: Formula | FormulaList, unit: str, findings: Findings) -> Formula | FormulaList:
     """The same with numbers with a unit in this one, if it is any (``in_unit``)."""
     if isinstance(formulas, FormulaList):
@@ -298,6 +304,9 @@ _STATES: Final = Map(
     Role("state", "model"),
     least=1,
 )
+#: What an event sets: a parameter or weights to a formula, weights to one number each, too.
+SetField = Annotated[Formula | FormulaList, Leaf(as_all_measured, FORMULAS, True)]
+FeedField = Annotated[Formula | FormulaList | None, Leaf(as_feed, Either((FORMULA, ListOf(FORMULA), NULL)), True)]
 InitialField = Annotated[Initial, Leaf(as_initial, Either((FORMULA, ListOf(FORMULA), _STATES)))]
 
 

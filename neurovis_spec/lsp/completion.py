@@ -16,7 +16,7 @@ from neurovis_spec import plugins
 from neurovis_spec.compiler.values.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.functions import GIVEN
-from neurovis_spec.language.grammar import Role
+from neurovis_spec.language.grammar import Role, naming
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import keys_at, role_of, words_at
 from neurovis_spec.language.ros_types import all_types, numbers_of
@@ -167,14 +167,14 @@ def _offers(
     role, scope = role_of(path, is_key), scope_of(path)
     word = at.typed
     rest = at.rest
-    if role is not None and role.use in ("formula", "template", "references", "ends", "setting value"):
+    if role is not None and role.use in ("formula", "template", "references", "ends", "settable", "setting value"):
         match = _WORD.search(at.typed)
         word = "" if match is None else match[0].rpartition(".")[2]
         following = _REST.match(at.rest)
         rest = "" if following is None else following[0]
     span = _span(document.file, place, word, rest)
     front = at.typed[: len(at.typed) - len(word)]
-    colon = ": " if is_key and not at.colon and role is not None and role.use != "ends" else ""
+    colon = ": " if is_key and not at.colon and role is not None and role.use not in ("ends", "settable") else ""
     for offer in (*_of_role(role, scope, path, front, index, place), *_of_body(role, document)):
         label = offer.label
         yield Completion(label, offer.sort, label + colon, span, offer.detail, offer.documentation)
@@ -201,6 +201,10 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from _neurons(scope, front, index, single=path[-2:-1] == ("positions",))
             if path[:1] == ("outputs",):
                 yield from _states(scope, front, index)
+        case "settable":
+            if not front.strip():
+                yield from _names(naming("parameter"), scope, path, index)
+            yield from _neurons(scope, front, index, single=False)
         case "choice":
             assert role.kind is not None
             yield from _definitions(known(role.kind, index.all_items).values())

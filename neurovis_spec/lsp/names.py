@@ -105,6 +105,10 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
                 yield from _formula(item, role, scope, text, lookup)
         case "ends" | "references":
             yield from _references(item, scope, text, lookup, stately=_may_be_states(item.path))
+        case "settable" if isinstance(parse(item.text), Arrow):
+            yield from _references(item, scope, text, lookup)
+        case "settable":
+            yield _whole(item, "parameter", scope, text)
         case "setting":
             assert role.kind is not None
             definition = Scope(None, (SECTIONS[role.kind], str(item.path[-2])))

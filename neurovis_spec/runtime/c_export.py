@@ -27,6 +27,7 @@ from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.emit_c import Emitter, Value
 from neurovis_spec.language.expressions.tree import Draw, Tree
 from neurovis_spec.runtime import c_plan
+from neurovis_spec.runtime.beginning import Rewind, slots_of
 from neurovis_spec.runtime.c_backend import SMALL
 from neurovis_spec.runtime.c_code import Code, Form, Tables, function, state_name, words_of
 from neurovis_spec.runtime.c_draws import drawing
@@ -108,6 +109,7 @@ class Exported:
             )
             raise ExportError(f"{problem}: export the network without this output")
         self.settable_names = identifiers(self.settable)
+        self._controls = Controls(self.network)
         self.phases = self._phases()
         #: whether any phase holds neurons
         self.holding = any(any(order >= 0 for order in phase.order) or phase.lesioned.any() for phase in self.phases)
@@ -135,7 +137,7 @@ class Exported:
 
     def _phases(self) -> list[Phase]:
         """What is held and left out after the events of each step, as in a run; no parameter decides that."""
-        network, controls = self.network, Controls(self.network)
+        network, controls = self.network, self._controls
         state = self.state.copy()
         phases = [self._phase(-1, state)]
         with np.errstate(all="ignore"):
@@ -202,6 +204,11 @@ class Exported:
         outlets and spikes are 0."""
         told = bool(self.network.outlets) or (self.spiking is not None and len(self.spiking.by_state) > 0)
         return self.holding and told
+
+    @property
+    def _rewinding(self) -> bool:
+        """Whether events put anything back to its beginning."""
+        return any(len(change.reset) for change in self.network.changes)
 
     @property
     def takes_initial(self) -> bool:
@@ -339,6 +346,8 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             lines += [*self._follow(), ""]
         if self.network.changes:
             lines += [*self._events(), ""]
+        if self._rewinding:
+            lines += [*self._rewinds(), ""]
         if self.network.vector_size:
             lines += [*self._sense(), ""]
         step = self._compute()
@@ -515,8 +524,10 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
                 for slot, _ in change.parameters:
                     code.line(f"    state->chosen[{slot}] = 1;")
                 code.line("}")
+            if len(change.reset):
+                self._silence(code, self._controls.beginnings.rewind(change.reset).lost)
             if after != phase:
-                self._mend(code, self.phases[phase].gone & ~self.phases[after].gone)
+                self._silence(code, np.flatnonzero(self.phases[phase].gone & ~self.phases[after].gone))
                 code.line(f"state->phase = {after};")
             if self.holding:
                 code.line("nv_hold(state);")
@@ -529,16 +540,53 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         code.line("}")
         return self._function(code, "What events change at the step to come.", "void nv_events", {})
 
-    def _mend(self, code: Code, mended: Mask) -> None:
-        """Nothing is under way on connections that are mended."""
-        layout = signal_layout(self.network, own=True)
-        connections = np.flatnonzero(mended & (layout.lengths > 0))
-        firsts, lengths = layout.offsets[connections].tolist(), layout.lengths[connections].tolist()
-        slots = [np.arange(first, first + length) for first, length in zip(firsts, lengths, strict=True)]
-        if slots:
-            places = np.concatenate(slots)
+    def _silence(self, code: Code, connections: IntArray) -> None:
+        """Nothing is under way on connections."""
+        places, _ = slots_of(signal_layout(self.network, own=True), connections)
+        self._put(code, "signals", places, np.zeros(len(places)))
+
+    def _rewinds(self) -> list[str]:
+        """What goes back to its beginning at the step to come, just before that is made."""
+        code = self._code()
+        code.line("switch (state->k) {")
+        for change in self.network.changes:
+            if len(change.reset):
+                code.line(f"case {change.at}: {{")
+                code.indent += 1
+                self._rewind(code, self._controls.beginnings.rewind(change.reset))
+                code.line("break;")
+                code.indent -= 1
+                code.line("}")
+        code.line("default:")
+        code.line("    break;")
+        code.line("}")
+        return self._function(code, "What goes back to its beginning at the step to come.", "void nv_rewind", {})
+
+    def _rewind(self, code: Code, rewind: Rewind) -> None:
+        """Neurons go back to their beginning, but for what is lost."""
+        network, depth = self.network, len(self.state.history)
+        self._put(code, "activity", rewind.neurons, rewind.activity)
+        self._put(code, "outlets", rewind.outlet_places, rewind.outlets)
+        for key, (members, values) in rewind.cells.items():
+            assert key.owner is not None
+            kept, start = self._state_starts[key.owner, key.name]
+            self._put(code, kept, members + start, values)
+        places, each = slots_of(signal_layout(network, own=True), rewind.steady)
+        if len(places):
+            with code.block(code.loop("i", len(places))):
+                weight = f"state->weights[{code.at(rewind.steady[each], 'i')}]"
+                sent = code.text(code.number(rewind.sent[each], "i"))
+                code.line(f"state->signals[{code.at(places, 'i')}] = {weight}*{sent};")
+        rows = np.arange(depth).reshape(-1, 1) * (len(network.neurons) + network.outlet_count)
+        columns = (rows + rewind.columns).ravel()
+        self._put(code, "history", columns, np.tile(rewind.column_values, depth))
+
+    def _put(self, code: Code, array: str, places: IntArray, values: FloatArray) -> None:
+        """The lines that put numbers into an array of the struct."""
+        if len(places):
             code.line(code.loop("i", len(places)))
-            code.line(f"    state->signals[{code.at(places, 'i')}] = {code.text(0.0)};")
+            value = code.text(code.number(values, "i"))
+            code.line(f"    state->{array}[{code.at(places, 'i')}] = {value};")
 
     def _sense(self) -> list[str]:
         """The inputs and the noise of a step."""
@@ -555,6 +603,8 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         for c_name, entry in zip(self.input_names, self.inputs, strict=True):
             code.line(code.loop("i", entry.size))
             code.line(f"    v[{entry.start} + i] = in != NULL ? in->{c_name}[i] : {code.text(0.0)};")
+        for name, first in network.settable.feeds.items():
+            self._fed(code, network.input_index[name], first)
         for noise in network.noises:
             self._noise(code, noise)
         if not self.inputs:
@@ -562,6 +612,15 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         pointer_lines = {**self._pointer_lines(), "v": f"{self.real} *const v = state->vector;"}
         more = f", const {self.name}_inputs *in"
         return self._function(code, "The inputs and the noise of a step.", "void nv_sense", pointer_lines, more)
+
+    def _fed(self, code: Code, entry: Input, first: int) -> None:
+        """The lines that put what events feed an input in the place of what it is else; ``first`` is the slot that says
+        whether they do."""
+        held = self.network.held_inputs.get(entry.name)
+        if held is not None:
+            code.line(f"v[{held}] = parameters[{first}];")
+        code.line(f"if (parameters[{first}] != {code.text(0.0)})")
+        code.line(f"    memcpy(v + {entry.start}, parameters + {first + 1}, {entry.size}*sizeof(v[0]));")
 
     def _row(self, code: Code, number: int, entry: Input) -> None:
         """The lines that take an input's row of this step from its table; behind the last row, the last."""
@@ -664,6 +723,8 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
     def _step(self) -> list[str]:
         """The step with all that belongs to it."""
         code, name = self._code(), self.name
+        if self._rewinding:
+            code.line("nv_rewind(state);")
         code.line("nv_sense(state, in);" if self.network.vector_size else "(void)in;")
         code.line("nv_compute(state);")
         code.line("state->k++;")
@@ -725,7 +786,11 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
 
 def _only_sets(change: Change) -> bool:
     """Whether it sets parameters and does nothing else, so that no phase begins with it."""
-    arrays = (change.mended_neurons, change.mended_connections, change.lesioned_neurons, change.lesioned_connections)
+    mended, lesioned = (
+        (change.mended_neurons, change.mended_connections),
+        (change.lesioned_neurons, change.lesioned_connections),
+    )
+    arrays = (*mended, *lesioned, change.reset)
     return not (change.clamps or change.released or change.learning or any(len(array) for array in arrays))
 
 

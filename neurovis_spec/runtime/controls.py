@@ -19,6 +19,7 @@ from neurovis_spec.compiler.events.patch import Patcher
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Key
 from neurovis_spec.language.expressions.functions import NUMPY, Library
+from neurovis_spec.runtime.beginning import Beginnings
 from neurovis_spec.runtime.presynaptic import remembering
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import Conditions, State
@@ -48,6 +49,7 @@ class Controls:
     by: Library = NUMPY
 
     def __post_init__(self) -> None:
+        self.beginnings = Beginnings(self.network)
         self._patcher = Patcher(self.network.settable, self.by)
         self._changes = {change.at: change for change in self.network.changes}
 
@@ -63,6 +65,13 @@ class Controls:
         with np.errstate(all="ignore"):
             self.apply(state, change)
         return True
+
+    def rewind(self, state: State) -> None:
+        """Put the neurons that events reset at the step to come back to their beginning. It is made just before that
+        step, not when all else changes, so that until then what they have become can be read."""
+        change = self._changes.get(state.k)
+        if change is not None and len(change.reset):
+            self.beginnings.rewind(change.reset).apply(self.network, state)
 
     def set(self, now: Conditions, weights: FloatArray, values: Mapping[int, float]) -> None:
         """Set slots and all that follows them: parameters, weights and variables, clamps; all or nothing. Raises
@@ -86,6 +95,8 @@ class Controls:
             for clamp in change.clamps:
                 now.held.begin(clamp, now.parameters, self.by)
             self.hold(now)
+        if len(change.reset):
+            lose(self.network, state, self.beginnings.rewind(change.reset).lost)
         if len(change.mended_neurons) or len(change.mended_connections):
             self.mend(state, change.mended_neurons, change.mended_connections)
         if len(change.lesioned_neurons) or len(change.lesioned_connections):

@@ -36,6 +36,8 @@ class Course:
     backend: str | Backend | Ready | None = None
     #: the recording to go on from
     start: Recording | None = None
+    #: whether of that nothing but the weights is taken
+    weights_alone: bool = False
     #: what may end it earlier
     until: Until | None = None
     #: what of a step is recorded

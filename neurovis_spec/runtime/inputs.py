@@ -69,9 +69,15 @@ class InputReader:
         self.network, self._on_rows, self._by = network, on_rows, by
         self._supplied = {name: _whole(_entry(network, name), value) for name, value in (supplied or {}).items()}
         self._parameters, self._variables, self._drawn_before = network.settable.parameters, network.settable.initial, 0
+        #: by inputs that events feed, and nobody supplies, the slots that say whether they are fed, and what
+        self._feeds = {
+            name: range(first, first + 1 + network.input_index[name].size)
+            for name, first in network.settable.feeds.items()
+            if name not in self._supplied
+        }
         read = (*(entry.slots for entry in network.inputs), *(noise.slots for noise in network.noises))
-        #: the slots (indices of parameters) that formulas read
-        self._read = sorted({slot for slots in read for slot in slots.values()})
+        #: the slots (indices of parameters) that formulas read, and feeds
+        self._read = sorted({slot for slots in read for slot in slots.values()}.union(*self._feeds.values()))
         #: whether a table follows parameters
         self._tables = any(table_of(number) in network.settable.variables for number in range(len(network.inputs)))
         #: the rows made last, and the step of the first of them
@@ -102,7 +108,7 @@ class InputReader:
         """Leave to a stepper the inputs that it can compute itself, ``but`` those of these names."""
         if not isinstance(stepper, Reading):
             return
-        kept = {*self._supplied, *but, *(self.network.inputs[number].name for number in self._undefined)}
+        kept = {*self._supplied, *self._feeds, *but, *(self.network.inputs[number].name for number in self._undefined)}
         self.left = frozenset(one.name for one in self.network.inputs if one.is_formula) - kept
         sizes = (one.size for one in self.network.inputs if one.name in self.left)
         self.all_left = sum(sizes) == self.network.vector_size
@@ -114,6 +120,11 @@ class InputReader:
         if given.keys() != self._left_beside[0]:
             self._left_beside = frozenset(given), self.left.difference(given)
         return self._left_beside[1]
+
+    @property
+    def fed(self) -> frozenset[str]:
+        """The inputs that are fed by events now."""
+        return frozenset(name for name, slots in self._feeds.items() if self._parameters[slots[0]])
 
     def use(self, state: State) -> None:
         """Take parameters as a state has them by now; what depends on those that have changed is made anew."""
@@ -167,11 +178,11 @@ class InputReader:
         if self.left:  # by functions that give the same bits whatever stands beside a number
             count = min(self._most, -(-(stop - first) // count) * count)
         steps = np.arange(first, first + count)
-        rows = np.zeros((count, self.network.vector_size))
+        rows, fed = np.zeros((count, self.network.vector_size)), self.fed
         for entry in self.network.inputs:
             if entry.name not in self.left:
                 rows[:, entry.start : entry.start + entry.size] = self._source(entry, steps)
-            if entry.name in self._supplied and entry.name in self.network.held_inputs:
+            if (entry.name in self._supplied or entry.name in fed) and entry.name in self.network.held_inputs:
                 rows[:, self.network.held_inputs[entry.name]] = 1.0
         for noise in self.network.noises:
             rows[:, noise.start : noise.start + len(noise.members)] = self._noise(noise, noise.expression, steps)
@@ -187,6 +198,8 @@ class InputReader:
         hidden = np.zeros((len(steps), self.network.vector_size), dtype=np.bool_)
         for number, tree in self._undefined.items():
             entry = self.network.inputs[number]
+            if entry.name in self.fed:
+                continue
             values = self._each(entry, tree, steps) if entry.indexed or entry.is_drawn else None
             if values is None:
                 values = np.broadcast_to(self._evaluated(entry, tree, steps), len(steps)).reshape(-1, 1)
@@ -197,6 +210,9 @@ class InputReader:
         return hidden
 
     def _source(self, entry: Input, steps: npt.NDArray[np.int64]) -> FloatArray | float:
+        if entry.name in self._feeds and self._parameters[self._feeds[entry.name][0]]:
+            values = self._parameters[self._feeds[entry.name][1:]]
+            return np.broadcast_to(values, (len(steps), entry.size))
         table = self._supplied.get(entry.name, self._table(entry))
         if table is not None:
             chosen: FloatArray = table[np.minimum(steps, len(table) - 1)]

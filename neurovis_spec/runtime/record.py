@@ -33,7 +33,7 @@ from neurovis_spec.runtime.formed import Forming
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.resume import resumed_state
+from neurovis_spec.runtime.resume import learned_state, resumed_state
 from neurovis_spec.runtime.rows import STRETCH, After, Rows, RowSink, Steps, Widths
 from neurovis_spec.runtime.spikes import SpikeLog
 from neurovis_spec.runtime.state import State, initial_state
@@ -82,7 +82,8 @@ def begin_run(network: Network, course: Course) -> tuple[Course, State]:
     before = state or course.start
     backend = ready(network, course.backend, "" if before is None else before.backend)
     if state is None and course.start is not None:
-        state = resumed_state(network, course.start, backend.functions)
+        resumed = learned_state if course.weights_alone else resumed_state
+        state = resumed(network, course.start, backend.functions)
     state = state or initial_state(network)
     backend.take(state)
     return replace(course, backend=backend), state
@@ -230,6 +231,7 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     with np.errstate(all="ignore"):
         for begin, end in pairwise(edges):
             controls.begin(state)
+            controls.rewind(state)
             reader.use(state)
             first = begin
             while first < end:
@@ -320,7 +322,7 @@ class _OneByOne:
             if keep and forming is not None:
                 before = state.weights.copy()
             if body is not None:
-                vector = body.sense(vector, self.given)
+                vector = body.sense(vector, self.given | reader.fed)
                 watch.take_inputs_at(k, vector, body.inputs)
                 if keep:
                     body.show(sensors[row], poses[row])

@@ -30,6 +30,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Holder, Key, Population, Quantity, Use
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
+from neurovis_spec.runtime.beginning import learning
 from neurovis_spec.runtime.controls import Controls, lose
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import of_table
@@ -82,6 +83,19 @@ def resumed_state(
     if kept is not None:
         kept.restore(state)
     state.activity = recording.activity[-1][column_of]
+    return state
+
+
+def learned_state(network: Network, recording: Recording, functions: Library = NUMPY) -> State:
+    """The state before a new trial that keeps nothing but the weights of connections that learn: activities, states,
+    parameters and lesions are those of the beginning, random numbers go on. Raises RecordingError."""
+    (of_table(recording, network) or recording).check_whole("a run cannot go on from")
+    _matching_neurons(network, recording)
+    state, learns = initial_state(network), learning(network)
+    columns, places = _learned_weights(network, recording)
+    kept = learns[places]
+    state.weights[places[kept]] = recording.weights_after[columns[kept]]
+    state.drawn = recording.reached
     return state
 
 
@@ -268,6 +282,8 @@ def _learned_weights(network: Network, recording: Recording) -> tuple[IntArray, 
     for binding in network.settable.bindings:
         if binding.weights:
             follows[binding.indices] = True
+    for binding in network.settable.given_by_events:  # these are kept as those that are learned
+        follows[binding.indices] = False
     columns, places = [], []
     for column, index in enumerate(recording.plastic.tolist()):
         name = recording.connection_names[index]

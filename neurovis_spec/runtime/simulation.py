@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self, TypeAlias
+from typing import TYPE_CHECKING, Literal, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,7 @@ from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.units import UnitError, measured, number_in
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.backend import Backend, Reading, Ready, ready
+from neurovis_spec.runtime.beginning import new_trial
 from neurovis_spec.runtime.columns import ALL, Keep, Probe, named_signals, probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
@@ -280,12 +281,14 @@ class Simulation:
                 raise TypeError(f"inputs are given by name, not as {type(values).__name__}: step(target=0.3)")
             inputs = {**values, **inputs}
         reader, watch, k = self._reader, self._watch, state.k
+        if self._eventful:
+            self._controls.rewind(state)
         if reader.all_left and not inputs:
             vector = self._stepper.vector
         else:
             vector = reader.at(k, inputs)
             if body is not None:
-                vector = body.sense(vector, self._given.union(inputs))
+                vector = body.sense(vector, self._given.union(inputs, reader.fed))
         recorder = self._recorder if self._recorder is not None and self._recorder.going else None
         if recorder is not None:
             recorder.begin(state)
@@ -449,11 +452,16 @@ class Simulation:
         """The neurons, or else the connections, that a reference names."""
         return find_parts(self.network, arguments.text("reference", text), self._names)
 
-    def reset(self) -> None:
-        """Back to the beginning, with the parameters of the beginning. Raises RecordingError where it is recorded."""
-        self._check_recorded(self._begin)
+    def reset(self, keep: Literal["weights"] | None = None) -> None:
+        """Back to the beginning, with the parameters of the beginning. A new trial may ``keep`` the ``"weights"`` that
+        have been learned, with centres: then random numbers go on where they were. Raises RecordingError where it is
+        recorded, ValueError for anything else to be kept."""
+        if keep not in (None, "weights"):
+            raise ValueError(f"a reset keeps 'weights' or None, not {reprlib.repr(keep)}")
+        begin = self._begin.copy() if keep is None else new_trial(self.network, self._begin, self._state)
+        self._check_recorded(begin)
         self._watch.warned = False
-        self._take(self._begin.copy())
+        self._take(begin)
         if self._body is not None:
             self._body.take(self._state)
 

@@ -33,9 +33,10 @@ class Clamp(NamedTuple):
 class Change(NamedTuple):
     """What changes at the beginning of step ``at``.
 
-    ``parameters`` are slots and what they are set to, by the values that the parameters have before this step;
-    ``clamps`` begin, those of the events ``released`` end; neurons and connections are lesioned or mended; the rules of
-    connections are switched on or off (``learning``).
+    ``parameters`` are slots, those that events alone set among them, and what they are set to, by the values that the
+    parameters have before this step; ``clamps`` begin, those of the events ``released`` end; neurons and connections
+    are lesioned or mended; the rules of connections are switched on or off (``learning``); neurons go back to their
+    beginning (``reset``).
     """
 
     at: int
@@ -47,6 +48,7 @@ class Change(NamedTuple):
     lesioned_neurons: IntArray = NO_INDICES
     lesioned_connections: IntArray = NO_INDICES
     learning: tuple[tuple[IntArray, bool], ...] = ()
+    reset: IntArray = NO_INDICES
 
 
 @dataclass

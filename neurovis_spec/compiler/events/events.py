@@ -8,18 +8,44 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
+from typing import NamedTuple
 
 from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.finder import Finder
-from neurovis_spec.compiler.names.references import key_of, other_parameter
+from neurovis_spec.compiler.names.references import key_of, known_inputs, other_parameter
 from neurovis_spec.compiler.names.state_references import StateOf
+from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, Undeclared, shorten
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import names_of
-from neurovis_spec.language.references import Sum, parse
+from neurovis_spec.language.references import Arrow, Sum, parse
 from neurovis_spec.language.sections import EventModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
+from neurovis_spec.language.values import FormulaList
+from neurovis_spec.language.yaml.source import Scalar
+
+
+class SetWeights(NamedTuple):
+    """Weights of connections that are set, as ``name`` says, to a formula, or to one each."""
+
+    name: str
+    members: IntArray
+    value: Formula | FormulaList
+    key: Span
+
+
+class Feed(NamedTuple):
+    """An input of so many numbers, and what it is fed: a formula a number, or None for its source again; ``node`` is
+    where that is written."""
+
+    name: str
+    size: int
+    values: tuple[Formula, ...] | None
+    key: Span
+    node: Scalar
 
 
 @dataclass(frozen=True)
@@ -42,14 +68,19 @@ class Event:
     learning: tuple[tuple[IntArray, bool], ...] = ()
     #: where each parameter that is set is named
     keys: Mapping[str, Span] = field(default_factory=dict)
+    weights: tuple[SetWeights, ...] = ()
+    feeds: tuple[Feed, ...] = ()
+    #: neurons that go back to their beginning
+    reset: tuple[IntArray, ...] = ()
 
 
 @dataclass(frozen=True)
 class EventReader:
-    """Reads the events of a spec; ``finder`` knows what references in them name."""
+    """Reads the events of a spec; ``finder`` knows what references name, ``inputs`` are those of the network."""
 
     finder: Finder
     constants: Constants
+    inputs: Mapping[str, Input]
 
     @property
     def findings(self) -> Findings:
@@ -70,15 +101,12 @@ class EventReader:
         if isinstance(at, int) and isinstance(to, int) and model.to is not None and to <= at:
             message = f"the clamp ends before it begins: from {at} to {to}, which is exclusive"
             self.findings.error("out-of-range", model.to.span, message)
-        # a name whose value could not be read (UNKNOWN) is checked, too; ``model.set`` is without it
-        given = {name: self.constants.measured(name, formula) for name, formula in model.set.items()}
-        for name, formula in names_of(model, "set", given).items():
-            self._check_set(model, name)
-            if formula is not UNKNOWN:
-                self.constants.scalar(formula)
+        given, weights = self._set(model)
+        feeds = [one for name in names_of(model, "feed", model.feed) for one in self._feed(model, name)]
         named = names_of(model, "clamp", model.clamp)
         clamps = [one for name, formula in named.items() for one in self._clamp(model, name, formula)]
         lesioned_neurons, lesioned_connections = self._neurons_and_connections(model.lesion)
+        reset = tuple(found for part in model.reset if (found := self.finder.neurons(part)) is not UNKNOWN)
         mended_neurons, mended_connections = self._neurons_and_connections(model.mend)
         learning = [
             one
@@ -97,8 +125,68 @@ class EventReader:
             mended_neurons=mended_neurons,
             mended_connections=mended_connections,
             learning=tuple(learning),
-            keys={name: key_of(model.source, "set", name).span for name in model.set},
+            keys={name: key_of(model.source, "set", name).span for name in given},
+            weights=tuple(weights),
+            feeds=tuple(feeds),
+            reset=reset,
         )
+
+    def _set(self, model: EventModel) -> tuple[dict[str, Formula], list[SetWeights]]:
+        """The parameters and the weights that an event sets, as far as they are valid."""
+        given: dict[str, Formula] = {}
+        weights: list[SetWeights] = []
+        # a name whose value could not be read (UNKNOWN) is checked, too; ``model.set`` is without it
+        values: Mapping[str, Formula | FormulaList] = model.set
+        named: Mapping[str, Formula | FormulaList | Unknown] = names_of(model, "set", values)
+        for name, value in named.items():
+            key = key_of(model.source, "set", name)
+            if isinstance(parse(name), Arrow):
+                weights += self._weights(key, value)
+                continue
+            self._check_set(model, name)
+            if isinstance(value, FormulaList):
+                message = f"the parameter '{shorten(name)}' takes one value, not a list"
+                self.findings.error("wrong-size", value.span, message)
+            elif value is not UNKNOWN:
+                given[name] = self.constants.measured(name, value)
+                self.constants.scalar(given[name])
+        return given, weights
+
+    def _weights(self, key: Located[str], value: Formula | FormulaList | Unknown) -> list[SetWeights]:
+        """The weights that a key of ``set`` names, and what they are set to; nothing where either is invalid, or where
+        nothing was drawn."""
+        members = self.finder.connections(key)
+        if value is UNKNOWN:
+            return []
+        items = value.items if isinstance(value, FormulaList) else (value,)
+        sound = [self.constants.scalar(item) is not UNKNOWN for item in items]
+        if members is UNKNOWN or not len(members) or not all(sound):
+            return []
+        return [SetWeights(key.value, members, value, key.span)]
+
+    def _feed(self, model: EventModel, name: str) -> list[Feed]:
+        """What a key of ``feed`` names, and what that is fed; nothing where either is invalid."""
+        key, value = key_of(model.source, "feed", name), names_of(model, "feed", model.feed)[name]
+        entry = self.inputs.get(name)
+        if entry is None:
+            message = f"there is no input '{shorten(name)}' to be fed"
+            lost, known = Undeclared(name, self.constants.home), tuple(self.inputs)
+            hint = partial(known_inputs, name, known)
+            self.findings.error("unknown-input", key.span, message, hint, undeclared=lost)
+        if value is UNKNOWN:
+            return []
+        items = () if value is None else value.items if isinstance(value, FormulaList) else (value,)
+        sound = [self.constants.scalar(item) is not UNKNOWN for item in items]
+        if entry is None or not all(sound):
+            return []
+        if isinstance(value, FormulaList) and len(items) != entry.size:
+            message = f"the input '{shorten(name)}' takes {plural(entry.size, 'number')}, not {len(items)}"
+            self.findings.error("wrong-size", value.span, message)
+            return []
+        if value is None:
+            return [Feed(name, entry.size, None, key.span, key.node)]
+        each = items if isinstance(value, FormulaList) else items * entry.size
+        return [Feed(name, entry.size, tuple(each), key.span, key.node)]
 
     def _check_set(self, model: EventModel, name: str) -> None:
         """Report a name that is no parameter, or one that cannot be set in a run."""

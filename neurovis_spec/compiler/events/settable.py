@@ -254,11 +254,21 @@ class Settable:
     variables: Mapping[Key, Variable] = field(default_factory=dict)
     #: the vector of all of these when a run begins
     initial: FloatArray = field(default_factory=lambda: np.zeros(0))
+    #: the first of the slots that events alone set (``event_slots``), which are no parameters; None without any
+    of_events: int | None = None
+    #: by inputs that events feed, the slot that says whether they are fed; behind it stand what they are fed
+    feeds: Mapping[str, int] = field(default_factory=dict)
 
     @cached_property
     def index(self) -> Mapping[str, int]:
         """The index of each slot by the name of its parameter."""
-        return {slot.name: index for index, slot in enumerate(self.slots)}
+        return {slot.name: index for index, slot in enumerate(self.slots[: self.of_events])}
+
+    @cached_property
+    def given_by_events(self) -> tuple[Binding, ...]:
+        """The bindings of weights that events give, and no parameter."""
+        first = len(self.slots) if self.of_events is None else self.of_events
+        return tuple(one for one in self.bindings if one.weights and any(slot >= first for slot in one.formula.slots))
 
     @cached_property
     def parameters(self) -> FloatArray:

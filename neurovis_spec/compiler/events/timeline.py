@@ -20,13 +20,14 @@ import numpy as np
 from neurovis_spec.arrays import IntArray, frozen
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.events.changes import NO_INDICES, Change, Clamp, Held
+from neurovis_spec.compiler.events.event_slots import Assigned, with_event_slots
 from neurovis_spec.compiler.events.events import Event
 from neurovis_spec.compiler.events.patch import Patch, Patcher, PatchError
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, table_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Key
 from neurovis_spec.compiler.values.constants import Constants, check_finite
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.unknown import UNKNOWN
@@ -38,25 +39,19 @@ _MOST_CLAMPS = 1 << 32
 def with_changes(network: Network, events: tuple[Event, ...], constants: Constants) -> Network:
     """The network with what its events change. An expression that is set sees the values that the parameters have by
     then, not those of the other parameters that are set at the same step."""
-    settable = constants.settable.keys()  # names; the slots themselves are in ``network.settable``
-    events = tuple(  # a parameter whose own value is invalid has no slot, and that is reported
-        event
-        if event.set.keys() <= settable
-        else replace(event, set={name: value for name, value in event.set.items() if name in settable})
-        for event in events
-    )
+    network, assigned = with_event_slots(network, events, constants.settable, constants.findings)
     starting_at, ending_at = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
     for index, event in enumerate(events):
         starting_at[event.at].append(index)
         if event.clamp and event.to is not None:
             ending_at[event.to].append(index)
     changes = tuple(
-        _change(network, step, {index: events[index] for index in starting_at[step]}, ending_at[step], constants)
+        _change(network, step, {at: events[at] for at in starting_at[step]}, assigned, ending_at[step], constants)
         for step in sorted({*starting_at, *ending_at})
     )
     trial, run_hash = _TrialRun(network, events, changes, constants), hashlib.sha256()
     for change in changes:  # each is tried out, findings included, with all that those before it have made
-        run_hash.update(trial.apply(change, [events[index] for index in starting_at[change.at]]))
+        run_hash.update(trial.apply(change, [one for index in starting_at[change.at] for one in assigned[index]]))
     return replace(network, changes=changes, hash=digest(network.hash, run_hash.hexdigest()))
 
 
@@ -71,15 +66,22 @@ def _index_in_event(clamp_order: int) -> int:
     return clamp_order % _MOST_CLAMPS
 
 
-def _change(network: Network, step: int, starting: dict[int, Event], ending: list[int], constants: Constants) -> Change:
+def _change(
+    network: Network,
+    step: int,
+    starting: dict[int, Event],
+    assigned: tuple[tuple[Assigned, ...], ...],
+    ending: list[int],
+    constants: Constants,
+) -> Change:
     """What several events change at a step; of those that do the same the last one counts. Events are known by their
-    index."""
+    index; ``assigned`` is what each sets."""
     values: dict[int, ParameterFormula] = {}
     clamps: list[Clamp] = []
     learning: list[tuple[IntArray, bool]] = []
     for index, event in starting.items():
-        for name, formula in event.set.items():
-            values[constants.settable[name]] = _formula(formula, constants)
+        for one in assigned[index]:
+            values[one.slot] = _formula(one.formula, constants)
         for index_in_event, (what, formula) in enumerate(event.clamp):
             order, places = _clamp_order(index, index_in_event), network.clamp_places(what)
             clamps.append(Clamp(order, event=index, neurons=places, value=_formula(formula, constants)))
@@ -95,6 +97,7 @@ def _change(network: Network, step: int, starting: dict[int, Event], ending: lis
         mended_neurons=_union([neurons for event in events for neurons in event.mended_neurons]),
         mended_connections=with_twins(_union([some for event in events for some in event.mended_connections])),
         learning=tuple(learning),
+        reset=_union([neurons for event in events for neurons in event.reset]),
     )
 
 
@@ -109,13 +112,6 @@ def _formula(formula: Formula, constants: Constants) -> ParameterFormula:
     """A formula of an event over the parameters, whatever values these have by then."""
     tree = constants.tree(formula)
     return constants.bound(Number(0.0) if tree is UNKNOWN else tree)
-
-
-class _Setting(NamedTuple):
-    """Where a parameter is set, and to what."""
-
-    key: Span
-    formula: Formula
 
 
 class _WrittenArray(NamedTuple):
@@ -162,9 +158,14 @@ class _TrialRun:
         self._variables = settable.initial.copy()
         self._held = Held.none(self.network.clampable, self.network.spiking)
         self._arrays: dict[tuple[Binding, ...], tuple[_WrittenArray, ...]] = {}
+        #: the slots that events alone set, and those of them that say what inputs are fed
+        end = len(settable.slots) if settable.of_events is None else settable.of_events
+        self._own = frozenset(range(end, len(settable.slots)))
+        sizes = {name: self.network.input_index[name].size for name in settable.feeds}
+        self._fed = {name: [*range(first, first + 1 + sizes[name])] for name, first in sorted(settable.feeds.items())}
         self._read_in_run = self._slots_read_in_run()
         # without those of instances, which follow; by name, as the hash depends on no order of the spec
-        by_name = sorted((slot.name, index) for index, slot in enumerate(settable.slots) if "." not in slot.name)
+        by_name = sorted((name, index) for name, index in settable.index.items() if "." not in name)
         self._spec_slots = np.array([index for _, index in by_name], dtype=np.int64)
 
     @property
@@ -192,11 +193,10 @@ class _TrialRun:
             waiting += new
         return frozenset(read)
 
-    def apply(self, change: Change, events: list[Event]) -> bytes:
-        """Apply the changes of a step, which these events make, to the parameters, weights and clamps of this trial
+    def apply(self, change: Change, assigned: list[Assigned]) -> bytes:
+        """Apply the changes of a step, at which this is set, to the parameters, weights and clamps of this trial
         run. Gives bytes that identify their effect, for the hash."""
-        settings = self._settings(events)
-        setting_of = {slot: settings[self.network.settable.slots[slot].name] for slot, _ in change.parameters}
+        setting_of = self._settings(assigned)
         identities = [str(change.at).encode()]
         values: dict[int, float] = {}
         for slot, formula in change.parameters:
@@ -214,21 +214,23 @@ class _TrialRun:
             change.lesioned_neurons.tobytes(),
             change.lesioned_connections.tobytes(),
         ]
+        if len(change.reset):
+            identities.append(b"reset" + change.reset.tobytes())
         identities += (members.tobytes() + bytes([on]) for members, on in change.learning)
         return b"".join(len(identity).to_bytes(8, "little") + identity for identity in identities)
 
-    def _settings(self, events: list[Event]) -> dict[str, _Setting]:
-        """The last setting of each parameter at a step; a warning at one that another replaces."""
-        settings: dict[str, _Setting] = {}
-        for event in events:
-            for name, formula in event.set.items():
-                key = event.keys[name]
-                if name in settings:
-                    earlier = settings[name].key
-                    where = key.seen_from(earlier)
-                    message = f"'{name}' is set again at this step ({where}): what is set here is lost"
-                    self.findings.warning("no-effect", earlier, message, "set it once")
-                settings[name] = _Setting(key, formula)
+    def _settings(self, assigned: list[Assigned]) -> dict[int, Assigned]:
+        """The last setting of each slot at a step; a warning at one that another replaces."""
+        settings: dict[int, Assigned] = {}
+        told: set[Span] = set()
+        for one in assigned:
+            earlier = settings.get(one.slot)
+            if earlier is not None and earlier.key not in told:
+                told.add(earlier.key)
+                where = one.key.seen_from(earlier.key)
+                message = f"'{shorten(one.name)}' is set again at this step ({where}): what is set here is lost"
+                self.findings.warning("no-effect", earlier.key, message, "set it once")
+            settings[one.slot] = one
         return settings
 
     def _set(self, step: int, values: dict[int, float], keys: dict[int, Span]) -> tuple[bytes, frozenset[int]]:
@@ -247,7 +249,10 @@ class _TrialRun:
         previous, self._parameters = self._parameters, patch.parameters
         identity, has_effect = self._identity_and_effect(patch)
         patch.write(self._weights, self._variables)
-        if not has_effect and self._read_in_run.isdisjoint(patch.changed):
+        for name, slots in self._fed.items():
+            if not patch.changed.isdisjoint(slots):
+                identity += b"/feed/" + name.encode() + patch.parameters[slots].tobytes()
+        if not has_effect and self._read_in_run.union(self._own).isdisjoint(patch.changed):
             for slot, key in keys.items():
                 if previous[slot] != patch.parameters[slot]:
                     message = f"setting '{settable.slots[slot].name}' changes nothing in the run"
