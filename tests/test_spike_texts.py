@@ -107,3 +107,53 @@ def test_each_cause_is_told_once_where_it_is(changes: dict[str, str], expected: 
     errors = found(changes)
     assert len(errors) == bool(expected), errors
     assert all(one.startswith(expected) for one in errors), errors
+
+
+CELL = """
+neurovis: 1
+name: x
+time: {dt: 0.1 ms}
+models:
+  cell:
+    time: ms
+    parameters: {rest: 2}
+    ports: PORTS
+    let: {LET}
+    state: {v: {derivative: (drive - v)/7, jump: JUMP}}
+    spike: {when: v >= 1, set: {v: 0}, refractory: REST}
+    activity: ACTIVITY
+neurons: {A: {count: 3, model: MODEL, COMBINE}}
+connections: {A -> A: {pattern: chain, port: kick, delay: 0}}
+"""
+CIRCLE = "a: b, b: a"
+
+
+def told(**changes: str) -> list[str]:
+    """All findings of a cell, each by its code, its place, its message and what to do."""
+    text, given = CELL, {"PORTS": "[kick]", "LET": "", "JUMP": "kick", "REST": "rest", "ACTIVITY": "spike"}
+    for name, value in {**given, "MODEL": "cell", "COMBINE": "bias: 2", **changes}.items():
+        text = text.replace(name, value)
+    try:
+        findings = nv.compile_text(text).warnings
+    except nv.SpecError as error:
+        findings = error.diagnostics
+    return [f"{one.code} {one.span.line}:{one.span.column} {one.message}; {one.hint}" for one in findings]
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"LET": CIRCLE, "JUMP": "a*kick"}, ["let-cycle 10:11 "]),
+        ({"LET": CIRCLE, "ACTIVITY": "a"}, ["let-cycle 10:11 "]),
+        ({"LET": LONG, "JUMP": "a59*kick"}, []),
+        ({"LET": LONG, "JUMP": "a59*kick^2"}, ["jump-not-linear 11:50 "]),
+        ({"LET": "a: 2*kick, b: a - kick", "JUMP": "(b if v > 0 else 0) + drive/2"}, []),
+        ({"LET": "a: 2*kick, b: a - kick", "JUMP": "(b if v > 0 else v)"}, ["jump-not-linear 11:50 "]),
+        ({"PORTS": "[kick, {gain: sum}]", "JUMP": "gain"}, ["wrong-type 9:19 "]),
+        ({"JUMP": "kick}, spike: {derivative: -spike"}, ["duplicate-name 11:57 "]),
+    ],
+)
+def test_a_jump_is_read_through_intermediate_values(changes: dict[str, str], expected: list[str]) -> None:
+    errors = [one for one in told(**changes) if not one.startswith("unused")]
+    assert len(errors) == len(expected), errors
+    assert all(one.startswith(start) for one, start in zip(errors, expected, strict=True)), errors

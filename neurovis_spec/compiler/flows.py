@@ -76,7 +76,7 @@ def is_spike(model: Definition, sent: str) -> bool:
     let = dict(model.let)
     tree: Tree | None = next((one.each_step for one in model.gives if one.name == sent), Name(sent))
     while isinstance(tree, Name) and tree.name in let:
-        tree = let[tree.name]
+        tree = let.pop(tree.name)  # in a circle of names, which is reported, it is none
     return model.fires and isinstance(tree, Name) and tree.name == SPIKE  # wherever it is written
 
 

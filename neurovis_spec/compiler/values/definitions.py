@@ -485,8 +485,8 @@ class _Checker:
     def _check_jump(self, tree: Tree, formula: Formula, let: tuple[tuple[str, Tree], ...]) -> None:
         """Report a jump that adds anything but multiples of what arrives, so that nothing is added where nothing
         arrives."""
-        if isinstance(tree, Number) and tree.value == 0:  # as of one that is invalid, which is reported
-            return
+        if self.known.is_open or (isinstance(tree, Number) and tree.value == 0):
+            return  # as of one that is invalid, or reads what is, which is reported
         ports, read = [DRIVE, *(port.name.value for port in self.parts.ports)], set(names(tree))
         for name, between in reversed(let):
             read |= names(between) if name in read else set()
@@ -494,7 +494,7 @@ class _Checker:
         if other is not None:
             message = f"'{other.name.value}' combines by {other.combine}, and a jump adds up what arrives"
             self.findings.error("jump-not-linear", formula.span, message, "a port by which a state jumps is a sum")
-        elif share_of(tree, ports, dict(let)) != "multiple":
+        elif share_of(tree, ports, let) != "multiple":
             message = "a jump adds what arrives, times something: each term has one port, as a factor"
             hint = "as in jump: (1 - g)*excitatory; without spikes nothing is added"
             self.findings.error("jump-not-linear", formula.span, message, hint)
@@ -534,7 +534,10 @@ class _Checker:
         return Located(number_in(self.parts.time, written), formula.node)
 
     def no_spikes(self, definition: Definition) -> None:
-        """Report derivatives, and noise, that read a spike, which lasts no time."""
+        """Report derivatives, and noise, that read a spike, which lasts no time; not where something else has its name,
+        which is reported."""
+        if (self.arriving or definition.fires) and self.known.declared[SPIKE] is not self.firing:
+            return
         names = (_ARRIVING, EndName("post", SPIKE).text, *([SPIKE] if definition.fires else []))
         flows = {name: one.flow for name, one in (self.parts.state or {}).items()}
         written = [(definition.given.derivative, self.parts.derivative)]

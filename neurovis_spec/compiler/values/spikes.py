@@ -9,7 +9,7 @@ holds; ``set`` counts as the reset. It rests for r steps, the next one on; what 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
@@ -157,46 +157,47 @@ def always_finite(state: Quantity) -> bool:
 Share: TypeAlias = Literal["constant", "multiple", "other"]
 
 
-def share_of(tree: Tree, ports: Collection[str], let: Mapping[str, Tree], functions: Collection[str] = ()) -> Share:
+def share_of(tree: Tree, ports: Collection[str], let: Collection[tuple[str, Tree]]) -> Share:
     """How a formula depends on the ports of its model, which it may read through intermediate values.
 
     >>> from neurovis_spec.language.expressions.parser import parse
-    >>> [share_of(parse(text), "ab", {}) for text in ("2*x", "x*a + b/2", "a*b", "a + 1")]
+    >>> [share_of(parse(text), "ab", ()) for text in ("2*x", "x*a + b/2", "a*b", "a + 1")]
     ['constant', 'multiple', 'other', 'other']
     """
+    shares: dict[str, Share] = dict.fromkeys(ports, "multiple")
+    for name, between in let:
+        shares[name] = _share(between, shares)
+    return _share(tree, shares)
 
-    def of(tree: Tree) -> Share:
-        return share_of(tree, ports, let, functions)
 
-    if isinstance(tree, Name) and tree.name in let:
-        return of(let[tree.name])
-    if isinstance(tree, Name) and tree.name in ports:
-        return "multiple"
+def _share(tree: Tree, shares: Mapping[str, Share]) -> Share:
+    """The same by what is known of names; all others are constant."""
+    if isinstance(tree, Name):
+        return shares.get(tree.name, "constant")
     parts = tree.parts
+    found = [_share(part, shares) for part in parts]
     match tree:
         case Unary(operator="-" | "+"):
-            return of(tree.operand)
+            return found[0]
         case Chain(operators=("*" | "/", *_)) if "%" not in tree.operators:
-            return _product([of(part) for part in parts], [operator == "/" for operator, _ in tree.steps])
+            return _product(found, [operator == "/" for operator, _ in tree.steps])
         case Chain(operators=("+" | "-", *_)):
-            return _sum([of(part) for part in parts if not _is_zero(part)])
-        case Conditional():
-            if of(tree.condition) != "constant":
-                return "other"
-            return _sum([of(part) for part in (tree.then, tree.otherwise) if not _is_zero(part)])
-    return "constant" if all(of(part) == "constant" for part in parts) else "other"
+            return _sum(found, parts)
+        case Conditional() if found[1] == "constant":  # its condition
+            return _sum(found[::2], parts[::2])
+    return "constant" if all(share == "constant" for share in found) else "other"
 
 
 def _is_zero(tree: Tree) -> bool:
     return isinstance(tree, Number) and tree.value == 0
 
 
-def _sum(shares: list[Share]) -> Share:
-    found = set(shares)
+def _sum(shares: Sequence[Share], parts: Sequence[Tree]) -> Share:
+    found = {share for share, part in zip(shares, parts, strict=True) if not _is_zero(part)}
     return found.pop() if len(found) == 1 else "constant" if not found else "other"
 
 
-def _product(shares: list[Share], divisors: list[bool]) -> Share:
+def _product(shares: Sequence[Share], divisors: Sequence[bool]) -> Share:
     if all(share == "constant" for share in shares):
         return "constant"
     under = any(share != "constant" for share, divides in zip(shares[1:], divisors, strict=True) if divides)
