@@ -75,7 +75,7 @@ def _from_lists(node: AnyList, constants: Constants) -> tuple[FloatArray, IntArr
     if not len(node):
         findings.error("wrong-size", node.span, "an input needs at least one list of times, which may be empty")
         return UNKNOWN
-    cells = cells_of(node, findings, "a list of times", gaps=False)
+    cells = cells_of(node, findings, "expected a list of times, as in [0.1, 0.2]", gaps=False)
     if cells is UNKNOWN:
         return UNKNOWN
     with constants.following() as parts:
