@@ -157,3 +157,31 @@ def test_a_jump_is_read_through_intermediate_values(changes: dict[str, str], exp
     errors = [one for one in told(**changes) if not one.startswith("unused")]
     assert len(errors) == len(expected), errors
     assert all(one.startswith(start) for one, start in zip(errors, expected, strict=True)), errors
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"JUMP": "drive", "COMBINE": "bias: 1, combine: product"}, "jump-not-linear 14:56 a state of 'cell' jumps by"),
+        ({"JUMP": "kick", "COMBINE": "bias: 1, combine: product"}, ""),
+        ({"JUMP": "drive", "COMBINE": "bias: 1, combine: sum"}, ""),
+        ({"REST": "0.25"}, "refractory-rounded 12:52 REST 2.5 steps: it rests for 3 steps, 0.0003 s;"),
+        ({"REST": "250 us"}, "refractory-rounded 12:52 REST 2.5 steps"),
+        ({"REST": "0.00025 s"}, "refractory-rounded 12:52 REST 2.5 steps"),
+        ({"REST": "0.01"}, "refractory-rounded 12:52 REST 0.1 steps: it rests for 1 step, 0.0001 s;"),
+        ({"REST": "0.3"}, ""),
+        ({"REST": "rest*dt"}, ""),
+        ({"REST": "rest + v"}, ""),
+        ({"REST": "rest*f(1)"}, ""),
+        ({"MODEL": "{cell: {rest: [2, 1.75, 3]}}"}, "refractory-rounded 14:33 REST 17.5 steps"),
+        ({"MODEL": "{cell: {rest: -1}}"}, "refractory-rounded 14:33 REST -10 steps: it rests for 0 "),
+        ({"MODEL": "{lif: {refractory: 0.34}}", "port: kick": "port: pulses"}, "refractory-rounded 14:33 "),
+        ({"REST": "0, hold: v"}, ""),
+        ({", refractory: rest": ", hold: v"}, "useless-key 12:40 'hold' is for as long as 'refractory' says"),
+    ],
+)
+def test_what_a_jump_and_a_rest_are_not_is_told(changes: dict[str, str], expected: str) -> None:
+    findings = [one for one in told(**changes) if not one.startswith(("unused", "no-effect"))]
+    assert len(findings) == bool(expected), findings
+    expected = expected.replace("REST", "the refractory time of 'cell' is")
+    assert all(one.startswith(expected) for one in findings), findings

@@ -265,6 +265,11 @@ class Input:
         return self.expression is not None and draws(self.expression)
 
     @property
+    def counts(self) -> bool:
+        """Whether its numbers are how many events a step has."""
+        return self.spikes is not None or self.is_drawn
+
+    @property
     def is_formula(self) -> bool:
         """Whether its numbers follow from the step alone: an expression that draws nothing."""
         return self.expression is not None and not self.is_drawn

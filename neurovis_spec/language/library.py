@@ -291,9 +291,11 @@ class SpikeModel(Model):
     refractory: TimeField | None = Field(
         None, description="How long it cannot fire again: an expression in its unit of time, or a time such as 5 ms."
     )
-    hold: Annotated[TextsField, naming("local")] = Field(
-        default=(), description="States that stay as they are for so long."
-    )
+    hold: Annotated[
+        TextsField,
+        naming("local"),
+        Needs(("refractory",), "'hold' is for as long as 'refractory' says", "add refractory: 2 ms, or remove it"),
+    ] = Field(default=(), description="States that stay as they are for so long.")
 
 
 class ModelModel(TimedModel):

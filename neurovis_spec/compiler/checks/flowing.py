@@ -16,14 +16,14 @@ from neurovis_spec.arrays import BoolArray, Indices, integers
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.neurons import unreached
 from neurovis_spec.compiler.connections.connect import Connected
-from neurovis_spec.compiler.flows import plain_flow, ports_read_by, sent_by
+from neurovis_spec.compiler.flows import plain_flow, ports_read_by, reads, sent_by
 from neurovis_spec.compiler.levels import Cycle, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
-from neurovis_spec.compiler.program import SYNAPSE, Definition, EndName
+from neurovis_spec.compiler.program import DRIVE, SYNAPSE, Definition, EndName
 from neurovis_spec.compiler.stiffness import stiffest_at_begin
 from neurovis_spec.compiler.taken import Side, Wired, read_at, reads_past
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.diagnostics import Findings, Span, listed
 from neurovis_spec.language.expressions.derivative import as_derivative
 from neurovis_spec.language.library import StateModel
 from neurovis_spec.language.words import Method
@@ -43,6 +43,7 @@ def check_flowing(compiled: Compiled, findings: Findings) -> None:
     if by.method in _HIGHER:
         _held_couplings(compiled, by.method, findings)
     _held_noise(compiled, findings)
+    _held_events(compiled, findings)
     _steps_by_hand(compiled, by.method, findings)
     _stiff(compiled, findings)
 
@@ -145,6 +146,29 @@ def _held_noise(compiled: Compiled, findings: Findings) -> None:
             message = f"this noise is held over each step, and {reader}: its effect"
             hint = "give the state a 'noise' of its own, which is scaled by the root of the step"
             findings.warning("noise-held", formula.span, f"{message} becomes less with a shorter step", hint)
+
+
+def _held_events(compiled: Compiled, findings: Findings) -> None:
+    """Inputs that count events, at ports that a derivative reads which does not divide by the length of a step."""
+    inputs = [one for one in compiled.network.inputs if one.counts]
+    counts = {place for one in inputs for place in range(one.start, one.start + one.size)}
+    told = set[Span]()
+    for group in compiled.census.groups if inputs else ():
+        model, given = group.kind.model.definition, {DRIVE: group.input, **group.port_input}
+        read = [reads(model, [state.derivative]) for state in model.flows]
+        held = frozenset[str]().union(*(names for names in read if "dt" not in names))
+        for written, at in group.model.input or ():
+            port = DRIVE if at is None else at.value
+            if port not in held or written.span in told or int(given[port][0]) not in counts:
+                continue
+            told.add(written.span)
+            message = f"'{written.value}' counts events, and a derivative of '{model.name}' reads '{port}':"
+            message += " what an event adds is in proportion to 'dt'"
+            jumps = sorted(ports_read_by(model).jump - held)
+            hint = "let a state 'jump' by a port of its own, which adds the count once"
+            if jumps:
+                hint = f"a state jumps by {listed(jumps)}: write input: {{{jumps[0]}: {written.value}}}"
+            findings.warning("events-held", written.span, message, hint)
 
 
 def _read_by_synapses(compiled: Compiled) -> dict[str, BoolArray]:

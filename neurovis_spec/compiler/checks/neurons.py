@@ -9,7 +9,8 @@ without a single connection is a sketch: of its neurons only those are reported 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -18,12 +19,16 @@ import numpy.typing as npt
 from neurovis_spec.arrays import PIECE, Indices, IntArray, pieces, sorting, starts_of
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.events.settable import bias_of
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.neurons.groups import NeuronType
 from neurovis_spec.compiler.neurons.initial_states import beginning
 from neurovis_spec.compiler.program import DRIVE, SYNAPSE, Definition, Population
-from neurovis_spec.compiler.values.spikes import still_fires
+from neurovis_spec.compiler.values.constants import NEAR_INTEGER
+from neurovis_spec.compiler.values.spikes import steps_at_rest, still_fires
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.library import Library
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
@@ -40,6 +45,7 @@ def check_neurons(compiled: Compiled, findings: Findings) -> None:
     """Warn of idle neurons, once for each group as it is written, and of what a model leaves out of account."""
     told = _warn_ignored(compiled, findings)
     _warn_firing_once(compiled, findings)
+    _warn_rounded_rests(compiled, findings)
     if any(event.clamp for event in compiled.spec.events):
         return  # what is clamped is active from outside
     _warn_idle(compiled, told, findings)
@@ -64,13 +70,45 @@ def _warn_firing_once(compiled: Compiled, findings: Findings) -> None:
     not armed again before something else makes that false."""
     told: set[Span] = set()
     for neuron_type, written in compiled.models:
-        model, span = neuron_type.model, written.source.span if written.model is None else written.model.name.span
+        model, span = neuron_type.model, _place_of_model(written)
         if span in told or not still_fires(model.definition, model.parameters, compiled.network.dt):
             continue
         told.add(span)
         message = f"with these parameters 'when' of the model '{model.definition.name}' still holds behind 'set'"
         hint = "a neuron fires once then, until 'when' has been false: let 'set' make it false, or leave it out"
         findings.warning("unreachable-spike", span, message, hint)
+
+
+def _place_of_model(written: GroupModel) -> Span:
+    return written.source.span if written.model is None else written.model.name.span
+
+
+def _warn_rounded_rests(compiled: Compiled, findings: Findings) -> None:
+    """Warn of refractory times that are no whole numbers of steps, where they are written, or where the group is whose
+    parameters make them so."""
+    told: set[Span] = set()
+    for neuron_type, written in compiled.models:
+        model, span = neuron_type.model.definition, _place_of_rest(neuron_type, written, compiled.libraries)
+        exact = steps_at_rest(model, neuron_type.model.parameters, compiled.network.dt)
+        if exact is None or span in told:
+            continue
+        off = exact[(np.abs(exact - np.rint(exact)) > NEAR_INTEGER) | (exact < 0)]
+        if len(off):
+            told.add(span)
+            steps = max(math.floor(off[0] + 0.5), int(off[0] > 0))
+            message = f"the refractory time of '{model.name}' is {off[0]:.12g} steps"
+            message += f": it rests for {plural(steps, 'step')}, {steps * compiled.network.dt:.12g} s"
+            findings.warning("refractory-rounded", span, message, "write a whole number of steps, or shorten 'dt'")
+
+
+def _place_of_rest(neuron_type: NeuronType, written: GroupModel, libraries: Iterable[Library]) -> Span:
+    """Where a refractory time is written, or, if that is a formula or of a built-in model, where the model is named."""
+    name = neuron_type.model.definition.name
+    model = next((one.models[name] for one in libraries if name in one.models), None)
+    spike = None if model is None else model.spike
+    if spike is None or spike.refractory is None or isinstance(spike.refractory.value, str):
+        return _place_of_model(written)
+    return spike.refractory.span
 
 
 def _warn_idle(compiled: Compiled, told: set[Span], findings: Findings) -> None:

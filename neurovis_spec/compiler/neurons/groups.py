@@ -16,6 +16,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.events.settable import BIAS, Part
+from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
 from neurovis_spec.compiler.names.references import key_span, known_inputs
 from neurovis_spec.compiler.names.scope import Scope
@@ -163,6 +164,7 @@ class Builder:
         names, first_number = (UNKNOWN, None) if _may_lack_names(model) else self._names(name, model, start)
         n = UNKNOWN if names is UNKNOWN else len(names)
         kind = self._kind(name, model, n)
+        self._check_combine(model, kind)
         biases, bias_parts = self._bias(model, n, name, kind)
         given = as_states(model.initial or _NO_INITIAL, kind.model.definition, findings)
         initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name)
@@ -219,6 +221,16 @@ class Builder:
                 if refusal is not None:
                     refusal.report("unknown-port", port.span, self.constants.findings)
             yield DRIVE if port is None else port.value, value
+
+    def _check_combine(self, model: GroupModel, kind: NeuronType) -> None:
+        """Report a drive that is no sum, where a state jumps by it."""
+        neuron, combine = kind.model.definition, model.combine
+        if combine is None or combine.value == "sum" or not is_written(kind, model):
+            return
+        if DRIVE in ports_read_by(neuron).jump:
+            message = f"a state of '{neuron.name}' jumps by '{DRIVE}', which combines by {combine.value} here"
+            hint = "a port by which a state jumps is a sum: leave 'combine' out"
+            self.constants.findings.error("jump-not-linear", combine.span, message, hint)
 
     def _bias(
         self, model: GroupModel, n: int | Unknown, name: str, kind: NeuronType

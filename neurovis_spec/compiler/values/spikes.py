@@ -66,7 +66,7 @@ def still_fires(model: Definition, parameters: Mapping[str, FloatArray], dt: flo
     when = when_of(model.let)
     if when is None or model.reads_activation:
         return False
-    known: dict[str, Value] = {**CONSTANTS, "dt": dt * model.per_second, **parameters}
+    known = _known(model, parameters, dt)
     sets = {one.name: dict(one.acts).get("fire") for one in model.state if one.name != SPIKE}
     trees = {name: tree.then for name, tree in sets.items() if isinstance(tree, Conditional)}
     left = {name: _value(model, tree, known) for name, tree in trees.items() if reads(model, [tree]) <= known.keys()}
@@ -74,6 +74,24 @@ def still_fires(model: Definition, parameters: Mapping[str, FloatArray], dt: flo
     if read.isdisjoint(left) or not read <= known.keys() | left.keys():
         return False
     return bool(np.any(_value(model, when, {**known, **left})))
+
+
+def steps_at_rest(model: Definition, parameters: Mapping[str, FloatArray], dt: float) -> FloatArray | None:
+    """For how many steps some neurons rest behind a spike, not rounded, one for all or one a neuron; None where the
+    model has no refractory time, or one that more than parameters decide."""
+    fired = next((dict(one.acts)["fire"] for one in model.state if one.name == _RESTS), None)
+    rests = fired.then.parts[-1] if isinstance(fired, Conditional) else None
+    if not isinstance(rests, Conditional) or model.reads_activation:
+        return None
+    time, known = rests.condition.parts[0], _known(model, parameters, dt)
+    if not reads(model, [time]) <= known.keys():
+        return None
+    return np.atleast_1d(np.asarray(_value(model, time, known) / known["dt"]))
+
+
+def _known(model: Definition, parameters: Mapping[str, FloatArray], dt: float) -> dict[str, Value]:
+    """What is known of some neurons before a run."""
+    return {**CONSTANTS, "dt": dt * model.per_second, **parameters}
 
 
 def _value(model: Definition, tree: Tree, known: Mapping[str, Value]) -> Value:
