@@ -6,7 +6,7 @@ In: a Network, how the derivative of a state changes with it. Out: whether the s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final, NamedTuple
@@ -17,7 +17,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.flows import jacobian, slope_by, with_slope
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import Beginning, beginning, initial_states
-from neurovis_spec.compiler.program import MODEL, SYNAPSE, Definition, EndName, Population, Port, Projection
+from neurovis_spec.compiler.program import MODEL, SYNAPSE, Definition, Each, EndName, Population, Port, Projection
 from neurovis_spec.language.expressions.evaluate import Value
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import ExpressionError, Name, Tree
@@ -45,8 +45,7 @@ class Stiffest(NamedTuple):
 
     def is_too_stiff(self, network: Network) -> bool:
         """Whether a step of a network is too long for it."""
-        limit, by = limit_of(network), network.integration
-        return limit is not None and by is not None and network.dt / by.substeps * self.slope < limit
+        return _is_too_stiff(self.slope, network)
 
     def words(self, network: Network) -> tuple[str, str]:
         """What is said of a step that is too long for it, and what to do."""
@@ -60,15 +59,32 @@ class Stiffest(NamedTuple):
         return message, f"take a dt of at most {most}, or integrate: exponential"
 
 
+def _is_too_stiff(slope: float, network: Network) -> bool:
+    limit, by = limit_of(network), network.integration
+    return limit is not None and by is not None and network.dt / by.substeps * slope < limit
+
+
+class _Least(NamedTuple):
+    """Where the slope of a state is least: the member, a neuron or a connection, and the slope, per second."""
+
+    each: Each
+    member: int
+    state: str
+    slope: float
+
+
 def stiffest_at_begin(network: Network) -> Stiffest | None:
     """What is too stiff for the method as a run begins, most of all; None where nothing is, as far as is known."""
     if limit_of(network) is None:
         return None
     worst = min(_slopes(network), key=lambda one: one.slope, default=None)
-    return worst if worst is not None and worst.is_too_stiff(network) else None
+    if worst is None or not _is_too_stiff(worst.slope, network):
+        return None
+    names = network.neurons.names if worst.each == "neuron" else network.connection_names  # there may be many
+    return Stiffest(names[worst.member], worst.state, worst.slope)
 
 
-def _slopes(network: Network) -> Iterator[Stiffest]:
+def _slopes(network: Network) -> Iterator[_Least]:
     """For each flow state how its derivative changes with it where a run begins, at the neuron or the connection where
     that is least. What arrives is taken for nothing but the bias; how much a synapse gives way to its target counts."""
     joined = [one for one in network.projections if one.kind == SYNAPSE or one.use.definition.flows]
@@ -81,24 +97,23 @@ def _slopes(network: Network) -> Iterator[Stiffest]:
             begin = _with(_begun(network, population), slopes.let)
             for state, tree in slopes.diagonal.items():
                 found = np.asarray(begin.of(tree)) + _giving_way(population, state, begin, connected)
-                yield from _least(found, state, model, population.members, network.neurons.names)
+                yield from _least(found, state, model, population.members)
     for projection, begin in connected:
         made = projection.use.definition
         with suppress(ExpressionError):
             slopes = jacobian(made)
             for state, tree in slopes.diagonal.items():
                 own = _with(begin, slopes.let).of(tree)
-                yield from _least(own, state, made, projection.members, network.connection_names)
+                yield from _least(own, state, made, projection.members)
 
 
-def _least(
-    slopes: Value, state: str, definition: Definition, members: IntArray, names: Sequence[str]
-) -> Iterator[Stiffest]:
+def _least(slopes: Value, state: str, definition: Definition, members: IntArray) -> Iterator[_Least]:
     """Where the slope of a state is least, of those that are finite."""
     found = np.broadcast_to(slopes, members.shape)
     if np.isfinite(found).any():
         place = int(np.nanargmin(np.where(np.isfinite(found), found, np.nan)))
-        yield Stiffest(names[members[place]], state, float(found[place]) * definition.per_second)
+        slope = float(found[place]) * definition.per_second
+        yield _Least(definition.kind.each, int(members[place]), state, slope)
 
 
 def _begun(network: Network, population: Population) -> Beginning:

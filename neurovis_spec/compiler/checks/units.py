@@ -94,10 +94,12 @@ class Sheets:
         models = [population.model.definition.name for population in network.populations]
         found: dict[tuple[Kind, str], dict[tuple[str, str, Route], Between]] = {}
         for projection in network.projections:
-            at = [column.whole()[projection.members] for column in (connections.sources, connections.targets)]
-            rows = np.stack([connections.entry.whole()[projection.members], *(model_of[ends] for ends in at)], axis=1)
+            of_all = connections.entry, connections.sources, connections.targets
+            entries, *ends = (column.compact()[projection.members] for column in of_all)
+            shape = len(connections.each_route), len(models), len(models)
+            numbers = np.unique(np.ravel_multi_index((entries, *(model_of[of] for of in ends)), shape))
             those = found.setdefault((projection.kind, projection.use.definition.name), {})
-            for entry, source, target in np.unique(rows, axis=0).tolist():
+            for entry, source, target in np.stack(np.unravel_index(numbers, shape), axis=1).tolist():
                 one = Between(entry, models[source], models[target], connections.each_route[entry])
                 those.setdefault(one[1:], one)
         return {key: [*those.values()] for key, those in found.items()}
