@@ -129,6 +129,32 @@ def test_of_independent_trains_it_is_the_rate_everywhere() -> None:
     assert made.values == pytest.approx(20, rel=0.1)
 
 
+def test_lags_end_where_the_recording_does() -> None:
+    """Nothing is below 0, and no lag is divided by a time that there is not."""
+    run = with_trains([list(range(0, 100, 7)), list(range(3, 100, 10)), []], 100)
+    for reach in (0.2, 1e6, float("inf")):
+        made = analysis.correlogram(run, reach=reach, bins=40)
+        assert max(int(label) for label in made.rows.labels) == 95
+        assert (made.values >= 0).all()
+    for stop in (1, 2, 3):
+        values = analysis.correlogram(run, reach=1, stop=stop).values
+        assert np.isfinite(values[len(values) // 2]).all()
+    for reach in (0, -1, float("nan")):
+        with pytest.raises(ValueError, match="'reach' is above 0"):
+            analysis.correlogram(run, reach=reach)
+    for measure in (analysis.correlogram, analysis.intervals, analysis.rates):
+        with pytest.raises(ValueError, match="'bins' is at least 1, not 0"):
+            measure(run, bins=0)
+    with pytest.raises(ValueError, match="'windows' is at least 1, not 0"):
+        analysis.firing(run, windows=0)
+
+
+def test_a_group_may_begin_at_any_number() -> None:
+    text = SPEC.replace("K: {count: 2,", "K: {count: 2, first: 4,")
+    groups = analysis.group_firing(nv.compile_text(text).run(backend="reference"))
+    assert groups.rows.labels == ("K", "H")
+
+
 def test_what_follows_in_each_episode() -> None:
     run = with_trains([[10, 60, 110], [10, 60, 149], [30, 199]], 199)  # the last episode is not whole
     made = analysis.around(run, 50, bins=50)

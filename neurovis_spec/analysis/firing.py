@@ -71,7 +71,7 @@ def rates(
 ) -> NamedArray:
     """The rate of each group over time, a neuron and a second: a row for each of so many bins, by its first step."""
     trains = _trains(recording, of, start, stop)
-    edges = trains.cuts(bins)
+    edges = trains.cuts(_count(bins))
     values = np.stack([trains.counts(members, edges) / len(members) for members in trains.groups.values()], axis=1)
     values /= (np.diff(edges) * recording.dt)[:, None]
     return NamedArray("rates", values, _steps(edges), Axis("group", tuple(trains.groups)), "1/s")
@@ -91,7 +91,7 @@ def around(
     first, last = -(-trains.fired.first // steps), trains.fired.stop // steps
     if last <= first:
         raise RecordingError(f"no episode of {steps} steps is whole")
-    edges = np.unique(np.linspace(0, steps, min(bins, steps) + 1).astype(np.int64))
+    edges = _cuts(0, steps, _count(bins))
     inside = (trains.fired.steps >= first * steps) & (trains.fired.steps < last * steps)
     at, who = trains.fired.steps[inside] % steps, trains.places[inside]
     values = [
@@ -118,7 +118,7 @@ def intervals(
     if not len(every):
         raise RecordingError("no neuron fires twice")
     longest = int(np.quantile(every, 0.99, method="higher")) + 1
-    edges = np.unique(np.linspace(0, longest, min(bins, longest) + 1).astype(np.int64))
+    edges = _cuts(0, longest, _count(bins))
     shares = [np.histogram(own, edges)[0] / max(len(own), 1) for own in found.values()]
     return NamedArray("intervals", np.stack(shares, axis=1), _steps(edges), Axis("group", tuple(found)))
 
@@ -134,15 +134,18 @@ def correlogram(
     """Cross-correlograms: how often a neuron of one group fires so long after a spike of a neuron of another, a second;
     within a group of two different neurons, of a single neuron its autocorrelogram without the spike itself. A row for
     each bin of lags, by the step in its middle, up to ``reach`` seconds to either side (by default ten mean intervals
-    of the group that fires most, a quarter of the time at most); a column for each pair. Raises RecordingError where
-    nobody fires."""
+    of the group that fires most, a quarter of the time at most), as far as there are such lags; a column for each pair.
+    Raises RecordingError where nobody fires."""
     trains = _trains(recording, of, start, stop)
-    far = trains.reach() if reach is None else round(arguments.number("reach", reach) / recording.dt)
-    width = -(-2 * far // bins) | 1  # so that a bin is as far to either side of lag 0
+    steps = trains.fired.stop - trains.fired.first
+    far = trains.reach() if reach is None else round(_positive("reach", reach, steps * recording.dt) / recording.dt)
+    far = min(far, max(steps - 2, 0))
+    width = -(-2 * far // max(_count(bins), 2)) | 1  # so that a bin is as far to either side of lag 0
     half = max(1, far // width)
     edges = np.arange(-half, half + 2) * width - width // 2
     # of how much of the time there is a step so far away
-    seen = 1 - np.abs(edges[:-1] + width // 2) / (trains.fired.stop - trains.fired.first)
+    seen = 1 - np.abs(edges[:-1] + width // 2) / steps
+    seen = np.where(seen > 0, seen, np.nan)
     columns, values = list[str](), list[FloatArray]()
     for one, other in combinations_with_replacement(trains.groups, 2):
         members, others = trains.groups[one], trains.groups[other]
@@ -170,10 +173,7 @@ class _Trains:
 
     def cuts(self, count: int) -> IntArray:
         """The steps cut into so many parts, or as many as there are steps."""
-        first, stop = self.fired.first, self.fired.stop
-        wanted = min(arguments.integer("bins", count, 1), stop - first)
-        cuts: IntArray = np.unique(np.linspace(first, stop, wanted + 1).astype(np.int64))
-        return cuts
+        return _cuts(self.fired.first, self.fired.stop, count)
 
     def counts(self, members: IntArray, edges: IntArray) -> FloatArray:
         """All spikes of some neurons between these steps."""
@@ -199,13 +199,14 @@ class _Trains:
             mean = np.bincount(whose, between, count) / many
             spread = np.sqrt(np.bincount(whose, (between - mean[whose]) ** 2, count) / (many - 1))
             cv = np.where(many > 1, spread / mean, np.nan)
-        edges = self.cuts(windows)
+        edges = self.cuts(_count(windows, "windows"))
         at = np.searchsorted(edges, self.fired.steps, "right") - 1
         counts = np.zeros((count, len(edges) - 1))
         np.add.at(counts, (self.places, at), 1.0)
         fano = np.full(count, np.nan)
-        some = (spikes > 0) & (counts.shape[1] > 1)
-        fano[some] = counts[some].var(axis=1, ddof=1) / counts[some].mean(axis=1)
+        if counts.shape[1] > 1:
+            some = spikes > 0
+            fano[some] = counts[some].var(axis=1, ddof=1) / counts[some].mean(axis=1)
         return np.column_stack([spikes, spikes / self.seconds, mean * self.dt, cv, fano])
 
     def reach(self) -> int:
@@ -263,8 +264,8 @@ def _trains(recording: Recording, of: str | Sequence[str] | None, start: int | N
     index = {name: place for place, name in enumerate(recording.neurons)}
     names = tuple(recording.neurons[place] for place in recording.spiking.tolist())
     if of is not None:
-        asked = chosen(recording, of)
-        names = tuple(name for name in asked if index[name] in set(recording.spiking.tolist()))
+        spiking = frozenset(names)
+        names = tuple(name for name in chosen(recording, of) if name in spiking)
         if not names:
             raise RecordingError("none of these neurons spikes")
     first = recording.spike_range[0] if start is None else arguments.integer("start", start, 0)
@@ -288,12 +289,36 @@ def _groups(recording: Recording, names: Sequence[str]) -> Mapping[str, IntArray
     group_of, there = dict[str, str](), set(names)
     for name, (members, _) in recording.views.items():
         called = [recording.neurons[member] for member in members]
-        if there.issuperset(called) and called == [f"{name}{number}" for number in range(1, len(called) + 1)]:
+        if there.issuperset(called) and _are_numbered(name, called):
             group_of.update(dict.fromkeys(called, name))
     found: dict[str, list[int]] = {}
     for place, name in enumerate(names):
         found.setdefault(group_of.get(name, name), []).append(place)
     return {name: np.array(places, dtype=np.int64) for name, places in found.items()}
+
+
+def _are_numbered(name: str, called: Sequence[str]) -> bool:
+    """Whether neurons are called as those of a group of this name are: ``K3``, ``K4``, …"""
+    first = called[0].removeprefix(name) if called else ""
+    return first.isdecimal() and [*called] == [f"{name}{int(first) + place}" for place in range(len(called))]
+
+
+def _cuts(first: int, stop: int, count: int) -> IntArray:
+    """Steps cut into so many parts, or as many as there are steps."""
+    cuts: IntArray = np.unique(np.linspace(first, stop, min(count, stop - first) + 1).astype(np.int64))
+    return cuts
+
+
+def _count(value: object, name: str = "bins") -> int:
+    return arguments.integer(name, value, 1)
+
+
+def _positive(name: str, value: object, most: float) -> float:
+    """A number above 0; what is beyond ``most`` is that."""
+    number = arguments.number(name, value)
+    if not number > 0:
+        raise ValueError(f"'{name}' is above 0, not {number:g}")
+    return min(number, most)
 
 
 def _steps(edges: IntArray) -> Axis:
