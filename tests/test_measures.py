@@ -256,3 +256,74 @@ def test_of_many_steps_at_once_the_bits_are_those_of_each(text: str, together: b
             made = many.rows(rows, none, np.zeros((len(rows), 0)))
             np.testing.assert_array_equal(made, each)
             np.testing.assert_array_equal(np.signbit(made[made == made]), np.signbit(each[each == each]))
+
+
+GROUPS = """neurovis: 1
+name: groups
+time: {steps: 30, dt: 0.5}
+parameters: {half: 0.5}
+inputs: {wave: {size: 3, expression: sin(0.7*k + i)}}
+models: {slow: {state: {v: {each_step: 0.5*v + drive}}, activity: 2*v}}
+neurons: {K: {count: 3, input: wave, model: slow}, L: {count: 3, bias: 0.1*i}, M: {count: 2}, A: {bias: 0.25}}
+"""
+
+
+def of_groups(recording: Recording) -> dict[str, Array]:
+    """What some measures are, from the numbers of a run."""
+    k, level, v = recording["K"], recording["L"], recording["K.v"]
+    whole = range(1, len(recording) + 1)
+    return {
+        "mean(K, last=4)": np.array([k[max(0, t - 4) : t].mean() for t in whole]),
+        "rms(K - L, last=4)": np.array([np.sqrt(((k - level)[max(0, t - 4) : t] ** 2).mean()) for t in whole]),
+        "max(K)": np.array([k[:t].max() for t in whole]),
+        "min(abs(K + A), last=2)": np.array([np.abs(k + 0.25)[max(0, t - 2) : t].min() for t in whole]),
+        "count(K > half)": (k > 0.5).sum(axis=1).astype(float),
+        "count(K > L and K < A)": ((k > level) & (k < 0.25)).sum(axis=1).astype(float),
+        "mean(count(K > half), last=4)/3": np.array(
+            [(k > 0.5)[max(0, t - 4) : t].sum(axis=1).mean() / 3 for t in whole]
+        ),
+        "max(K1..K2) - mean(M)": np.array([k[:t, :2].max() for t in whole]),
+        "mean(K.v, last=4) + count(K.v > 0.2)": np.array(
+            [v[max(0, t - 4) : t].mean() + (v[t - 1] > 0.2).sum() for t in whole]
+        ),
+    }
+
+
+@pytest.mark.parametrize("text", of_groups(nv.compile_text(GROUPS).run(1, states="all")))
+def test_measures_are_over_the_neurons_of_groups_and_over_steps(text: str) -> None:
+    network = nv.compile_text(GROUPS)
+    recording = network.run(states="all")
+    found, expected = network.measure(text, recording), of_groups(recording)[text]
+    longest = measure_of(text, network.network, "<measure>").longest
+    np.testing.assert_allclose(found[longest - 1 :], expected[longest - 1 :], rtol=1e-14)
+    meter, probe = Meter(measure_of(text, network.network, "<measure>")), recording["K.v"]
+    states = probe if "K.v" in text else probe[:, :0]
+    parameters = network.network.settable.parameters
+    stepped = [meter.step(recording.activity[t], parameters, states[t]) for t in range(len(recording))]
+    np.testing.assert_array_equal(stepped, found)
+
+
+def test_a_run_ends_by_a_measure_over_a_group() -> None:
+    network = nv.compile_text(GROUPS)
+    until = network.until("count(K > half) == 3")
+    found = network.run(until=until)
+    wanted = np.flatnonzero((network.run()["K"] > 0.5).sum(axis=1) == 3)
+    assert until.ending is not None
+    assert len(found) == (wanted[0] + 1 if len(wanted) else 30)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("K > 0.5", "'K' is 3 neurons, and no single one"),
+        ("mean(K + M, last=2)", "'M' is 2 numbers, and 'K' 3"),
+        ("count(A > 0.5)", "'count' is of the neurons of a group"),
+        ("count(K > 0, 1)", "'count' takes 1 argument"),
+        ("count(count(K) > 1)", "'count' stands inside 'count'"),
+        ("count(K > mean(K))", "a summary over steps stands inside 'count'"),
+    ],
+)
+def test_what_is_wrong_with_groups_is_told(text: str, message: str) -> None:
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(GROUPS).until(text)
+    assert message in str(caught.value)

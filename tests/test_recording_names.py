@@ -104,3 +104,34 @@ def test_the_nearest_names_are_offered_and_what_is_named_twice_is_said(recording
         recording["p1.M"]
     with pytest.raises(UnknownNameError, match=r"'A1\.\.A4' names neurons that are named before it"):
         recording["A3 + A1..A4"]
+
+
+WEIGHTS = """\
+neurovis: 1
+name: x
+time: {dt: 0.5}
+neurons: {A: {count: 2, bias: 1}, K: {count: 3}, O: {}}
+connections:
+  - A -> K: {matrix: [[1, 2, ~], [4, ~, 6]], plasticity: {hebbian: {rate: 0.1}}}
+  - A -> O: 7
+  - A -> O: 8
+"""
+
+
+def test_weights_between_groups_are_a_matrix_a_row() -> None:
+    network = nv.compile_text(WEIGHTS)
+    recording = network.run(3)
+    found = recording.weight("A -> K")
+    assert found.shape == (3, 2, 3)
+    np.testing.assert_array_equal(found[0], [[1, 2, np.nan], [4, np.nan, 6]])
+    np.testing.assert_array_equal(found[:, 1, 2], recording.weight("A2 -> K3"))
+    assert found[2, 0, 0] > 1
+    np.testing.assert_array_equal(recording.weight("A2 -> K1 + K3")[0], [[4, 6]])
+    assert recording.t.tolist() == [0, 0.5, 1]
+    with pytest.raises(
+        UnknownNameError, match=r"two connections with both ends in common: name them, as 'A1 -> O \(2\)'"
+    ):
+        recording.weight("A -> O")
+    for wrong in ("K -> A", "A -> Q", "A", "A ->"):
+        with pytest.raises(UnknownNameError):
+            recording.weight(wrong)

@@ -9,21 +9,22 @@ from __future__ import annotations
 import copy
 import math
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.names.state_references import StateOf
+from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SPIKE
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate, evaluate_array
 from neurovis_spec.language.expressions.functions import rows_of
-from neurovis_spec.language.expressions.measures import PLACE, SPIKES, Formula, parse_measure
+from neurovis_spec.language.expressions.measures import COUNTED, PLACE, SPIKES, Formula, Summary, parse_measure
 from neurovis_spec.language.expressions.parser import ExpressionError
 from neurovis_spec.language.expressions.tree import Name, Tree, is_square, names, walk
 from neurovis_spec.language.references import Arrow, parse_sum, state_of
@@ -41,6 +42,14 @@ from neurovis_spec.runtime.windows import running
 _OF_TIME: Final = ("k", "t", "dt", "pi", "e")
 
 LABEL = "<measure>"
+#: what becomes of values (steps, members) of a group
+_ACROSS: Final[Mapping[str, Callable[[FloatArray], FloatArray]]] = {
+    "mean": lambda values: np.mean(values, axis=1),
+    "rms": lambda values: np.sqrt(np.mean(values * values, axis=1)),
+    "min": lambda values: np.min(values, axis=1),
+    "max": lambda values: np.max(values, axis=1),
+    "count": lambda values: np.sum((values != 0) & (values == values), axis=1).astype(np.float64),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +59,14 @@ class Measure:
     formula: Formula
     #: for each neuron that it names its index
     neurons: Mapping[str, int]
+    #: for each reference to several that stands in a window or a count their indices, as many in all of one of these
+    groups: Mapping[str, IntArray]
     #: for each parameter its slot, the index of its value
     slots: Mapping[str, int]
     #: for each state its column among those that ``probe`` reads
     states: Mapping[str, int]
+    #: for each reference to several states that stands in a window or a count their columns
+    state_groups: Mapping[str, IntArray]
     #: for each reference whose rate is asked for the neurons that it names whose activity is a spike, and the states
     #: that are the spikes of the others
     spikes: Mapping[str, tuple[IntArray, tuple[str, ...]]]
@@ -77,7 +90,7 @@ class Measure:
     def together(self) -> bool:
         """Whether ``Meter.rows`` gives the bits of ``Meter.step``, from activities and parameters alone: no function
         takes part that NumPy works out by itself."""
-        trees = (self.formula.tree, *(window.tree for window in self.formula.windows))
+        trees = _trees(self.formula)
         return not self.states and not any(_by_numpy(node) for tree in trees for node in walk(tree))
 
     def check_steps(self, steps: int) -> None:
@@ -129,19 +142,71 @@ def resolved(formula: Formula, network: Network, label: str) -> Measure:
     """The measure for the runs of a network. Raises SpecError for names that mean nothing, or not one number."""
     directory, findings = names_of(network), findings_of(formula.text, label)
     neurons: dict[str, int] = {}
+    groups: dict[str, IntArray] = {}
     slots: dict[str, int] = {}
     states: dict[str, StateOf] = {}
     spikes: dict[str, tuple[IntArray, tuple[str, ...]]] = {}
+    several_states: dict[str, tuple[str, ...]] = {}
     places = {PLACE(number) for number in range(len(formula.windows))}
-    for node in _named(formula):
-        span = _span(label, node.start, node.end)
-        if node.name.startswith(SPIKES):
-            _resolve_spikes(node.name, span, network, directory, spikes, states, findings)
-        elif node.name not in places and not _resolve_state(node.name, span, network, directory, states, findings):
-            _resolve(node.name, span, network, directory, neurons, slots, findings)
+    places |= {COUNTED(number) for number in range(len(formula.counts))}
+    for tree in _trees(formula):
+        named = [node for node in walk(tree) if isinstance(node, Name) and node.name not in places]
+        several = {} if tree is formula.tree else _several(named, directory)
+        groups |= {node.name: members for node, members in several.items()}
+        sizes = {node: len(members) for node, members in several.items()}
+        for node in named:
+            found = () if tree is formula.tree else _states_of(node.name, network, directory)
+            if len(found) > 1:
+                single = network.state_names(found)
+                states |= dict(zip(single, found, strict=True))
+                several_states[node.name], sizes[node] = single, len(single)
+                continue
+            span = _span(label, node.start, node.end)
+            if node.name.startswith(SPIKES):
+                _resolve_spikes(node.name, span, network, directory, spikes, states, findings)
+            elif node not in several and not _resolve_state(node.name, span, network, directory, states, findings):
+                _resolve(node.name, span, network, directory, neurons, slots, findings)
+        _check_sizes(sizes, label, findings)
+    for one in formula.counts:
+        if {*groups, *several_states}.isdisjoint(names(one.tree)):
+            message, hint = "'count' is of the neurons of a group", "write 'count(E > 0.5)', with a group"
+            findings.error("not-one-number", _span(label, one.start, one.end), message, hint)
     findings.check()
     columns = {name: column for column, name in enumerate(states)}
-    return Measure(formula, neurons, slots, columns, spikes, probe_of(network, states.values()), network.dt, label)
+    probe = probe_of(network, states.values())
+    of_several = {
+        name: np.array([columns[one] for one in single], dtype=np.int64) for name, single in several_states.items()
+    }
+    return Measure(formula, neurons, groups, slots, columns, of_several, spikes, probe, network.dt, label)
+
+
+def _states_of(name: str, network: Network, directory: Names) -> list[StateOf]:
+    """The states that a name means, one by one; none where it means anything else, or nothing."""
+    output = next((one for one in network.outputs if one.name == name and one.states), None)
+    found = () if output is None else output.states
+    if output is None and not name.startswith(SPIKES) and isinstance(directory.find(name), str):
+        with suppress(UnknownNameError):
+            found = tuple(find_states(network, name, directory))
+    return [StateOf.of(what, state, np.array([index])) for state, what, index in singles(found)]
+
+
+def _several(named: Iterable[Name], directory: Names) -> dict[Name, IntArray]:
+    """The names that are references to several neurons, and these."""
+    found = {node: directory.find(node.name) for node in named if not node.name.startswith(SPIKES)}
+    return {
+        node: np.array(one.neurons, dtype=np.int64)
+        for node, one in found.items()
+        if not isinstance(one, str) and not one.single
+    }
+
+
+def _check_sizes(sizes: Mapping[Name, int], label: str, findings: Findings) -> None:
+    """Report a reference that is not to as many as the one before it."""
+    for (first, before), (node, size) in pairwise(sizes.items()):
+        if size != before:
+            message = f"'{shorten(node.name)}' is {size} numbers, and '{shorten(first.name)}' {before}"
+            hint = "what is computed of two groups is computed one by one: take as many of both"
+            findings.error("not-one-number", _span(label, node.start, node.end), message, hint)
 
 
 def measure_of(text: str, network: Network, label: str, *, bounded: bool = False) -> Measure:
@@ -149,9 +214,9 @@ def measure_of(text: str, network: Network, label: str, *, bounded: bool = False
     return resolved(parsed(text, label, bounded=bounded), network, label)
 
 
-def _named(formula: Formula) -> Iterable[Name]:
-    trees = (formula.tree, *(window.tree for window in formula.windows))
-    return (node for tree in trees for node in walk(tree) if isinstance(node, Name))
+def _trees(formula: Formula) -> tuple[Tree, ...]:
+    """All trees of a formula, its own first."""
+    return formula.tree, *(window.tree for window in formula.windows), *(one.tree for one in formula.counts)
 
 
 def _resolve_state(
@@ -240,7 +305,8 @@ def _resolve(
     elif not found.single:
         first = network.neurons.names[found.neurons[0]]
         message = f"'{shorten(name)}' is {_counted(len(found.neurons))}, and no single one"
-        findings.error("not-one-number", span, message, f"name one of them, as in '{first}'")
+        hint = f"name one of them, as in '{first}', or sum them up: mean({shorten(name)}), count({shorten(name)} > 0.5)"
+        findings.error("not-one-number", span, message, hint)
     else:
         neurons[name] = found.neurons[0]
 
@@ -288,8 +354,14 @@ class Meter:
         known["k"] = float(k)
         known["t"] = k * self.measure.dt
         self.made += 1
+        for number, one in enumerate(self.measure.formula.counts):
+            known[COUNTED(number)] = float(self._across("count", one.tree, known, activity[None], states[None])[0])
         for number, window in enumerate(self.measure.formula.windows):
-            value = self._running[number].push(evaluate(window.tree, known))
+            if self._grouped(window.tree):
+                now = float(self._across(window.summary, window.tree, known, activity[None], states[None])[0])
+            else:
+                now = evaluate(window.tree, known)
+            value = self._running[number].push(now)
             self.values[number] = known[PLACE(number)] = value
         return math.nan if self.made < self.measure.longest else evaluate(self.measure.formula.tree, known)
 
@@ -300,6 +372,35 @@ class Meter:
         fired = np.count_nonzero(activity[:, neurons], axis=1) + np.count_nonzero(states[:, columns], axis=1)
         result: FloatArray = fired / ((len(neurons) + len(columns)) * self.measure.dt)
         return result
+
+    def _grouped(self, tree: Tree) -> bool:
+        """Whether a formula is of the neurons of a group, or of their states."""
+        return not {*self.measure.groups, *self.measure.state_groups}.isdisjoint(names(tree))
+
+    def _across(
+        self,
+        how: Summary | Literal["count"],
+        tree: Tree,
+        known: Mapping[str, float | FloatArray],
+        activity: FloatArray,
+        states: FloatArray,
+    ) -> FloatArray:
+        """A formula of the neurons of a group at each of some steps, summed up over them, (steps,). What is known of
+        each step, (steps,), is the same for all of them."""
+        read: dict[str, float | FloatArray] = {}
+        size = 1
+        for name in names(tree):
+            members, columns = self.measure.groups.get(name), self.measure.state_groups.get(name)
+            if members is not None:
+                read[name], size = activity[:, members], len(members)
+            elif columns is not None:
+                read[name], size = states[:, columns], len(columns)
+            else:
+                value = known[name]
+                read[name] = value.reshape(-1, 1) if isinstance(value, np.ndarray) else value
+        values = np.broadcast_to(evaluate_array(tree, read), (len(activity), size))
+        with np.errstate(all="ignore"):
+            return _ACROSS[how](values)
 
     def rows(self, activity: FloatArray, parameters: FloatArray, states: FloatArray) -> FloatArray:
         """After each of some more steps, all with the same parameters: a row of ``activity`` and ``states`` a step."""
@@ -312,8 +413,14 @@ class Meter:
         begin = self.first + self.made
         k = np.arange(begin, begin + count).astype(np.float64)
         known |= {"k": k, "t": k * self.measure.dt}
+        for number, one in enumerate(self.measure.formula.counts):
+            known[COUNTED(number)] = self._across("count", one.tree, known, activity, states)
         for number, window in enumerate(self.measure.formula.windows):
-            values = self._running[number].extend(_broadcast(window.tree, known, count))
+            if self._grouped(window.tree):
+                now = self._across(window.summary, window.tree, known, activity, states)
+            else:
+                now = _broadcast(window.tree, known, count)
+            values = self._running[number].extend(now)
             known[PLACE(number)] = values
             if count:
                 self.values[number] = float(values[-1])

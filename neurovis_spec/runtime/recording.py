@@ -22,6 +22,7 @@ from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.diagnostics import listed
+from neurovis_spec.language.references import Arrow, parse
 from neurovis_spec.runtime import pairwise
 from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unknown
 from neurovis_spec.runtime.named_array import NamedArray
@@ -183,10 +184,7 @@ class Recording:
     def names_of(self, reference: str) -> tuple[str, ...]:
         """The names of the neurons that a reference names (``K``, ``K3..K5``, ``left.K + O``). Raises KeyError with the
         nearest names."""
-        found = self._names.find(arguments.text("reference", reference))
-        if isinstance(found, str):
-            raise UnknownNameError(found)
-        return tuple(self.neurons[index] for index in found.neurons)
+        return tuple(self.neurons[index] for index in self._neurons_of(arguments.text("reference", reference)))
 
     def spikes(self, reference: str) -> Spikes:
         """When the neurons of a reference have fired: times in seconds, and which of them it was, as indices into
@@ -338,11 +336,48 @@ class Recording:
         """Connection name to index."""
         return {name: index for index, name in enumerate(self.connection_names)}
 
+    @property
+    def t(self) -> FloatArray:
+        """The seconds of each row, (rows,)."""
+        return np.asarray(self.step * self.dt, np.float64)
+
     def weight(self, name: str) -> FloatArray:
-        """w[t] of a connection by name, (rows,), also of one that stays. Raises KeyError with the nearest names."""
+        """w[t] of a connection by name, (rows,), also of one that stays; or of all connections between two references
+        (``K -> O``, ``K1..K3 -> O + P``) a matrix a row, (rows, sources, targets), in the order of ``names_of``, NaN
+        where there is no connection. Raises KeyError with the nearest names, or where two connections share both
+        ends."""
         index = self.connection_index.get(arguments.text("name", name))
         if index is None:
+            return self._matrix(name)
+        return self._weight_of(index, name)
+
+    def _matrix(self, name: str) -> FloatArray:
+        arrow = parse(name)
+        if not isinstance(arrow, Arrow):
             raise unknown("connection", name, self.connection_names)
+        places = [np.full(len(self.neurons), -1, dtype=np.int64) for _ in range(2)]
+        for end, place in zip((arrow.sources, arrow.targets), places, strict=True):
+            members = self._neurons_of(end.text)
+            place[list(members)] = np.arange(len(members))
+        rows, columns = places[0][self.sources], places[1][self.targets]
+        between = np.flatnonzero((rows >= 0) & (columns >= 0))
+        if not len(between):
+            raise unknown("connection", name, self.connection_names)
+        if (self.ranks[between] > 1).any():
+            several = self.connection_names[int(between[np.argmax(self.ranks[between] > 1)])]
+            raise UnknownNameError(f"'{name}' has two connections with both ends in common: name them, as '{several}'")
+        result = np.full((len(self), *(int(place.max()) + 1 for place in places)), np.nan)
+        for index in between.tolist():
+            result[:, rows[index], columns[index]] = self._weight_of(index, name)
+        return result
+
+    def _neurons_of(self, reference: str) -> tuple[int, ...]:
+        found = self._names.find(reference)
+        if isinstance(found, str):
+            raise UnknownNameError(found)
+        return found.neurons
+
+    def _weight_of(self, index: int, name: str) -> FloatArray:
         column = int(np.searchsorted(self.plastic, index))  # so many of those that change come before it
         if column < len(self.plastic) and self.plastic[column] == index:
             if not self.weights.shape[1]:

@@ -1,8 +1,9 @@
 """Measures: expressions of a run, such as ``rms(O - T, last=129) < 0.01``.
 
 In: the text of an expression whose names may be references to neurons and outputs (``left1.K3``), with ``rms``,
-``mean``, ``min``, ``max`` and ``rate`` over the last N steps. Out: a Formula: the windows, and a tree in which each of
-them is a name; or an ExpressionError. Names are not looked up here.
+``mean``, ``min``, ``max`` and ``rate`` over the last N steps, and ``count`` over the neurons of a group. Out: a
+Formula: the counts and the windows, and a tree in which each of them is a name; or an ExpressionError. Names are not
+looked up here.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from neurovis_spec.language.expressions import mistakes
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.lexer import Token
 from neurovis_spec.language.expressions.parser import Parser
-from neurovis_spec.language.expressions.tree import ExpressionError, Name, Number, Tree
+from neurovis_spec.language.expressions.tree import ExpressionError, Name, Number, Tree, walk
 from neurovis_spec.likeness import suggest
 
 #: What a window is summed up by.
@@ -24,9 +25,12 @@ Summary: TypeAlias = Literal["rms", "mean", "min", "max"]
 SUMMARIES: Final[tuple[Summary, ...]] = get_args(Summary)
 #: The name that stands for window i in the tree of a Formula; no author can write it.
 PLACE: Final[Callable[[int], str]] = "window {}".format
+#: The name that stands for count i.
+COUNTED: Final[Callable[[int], str]] = "count {}".format
 #: What the name of neurons has before it where their spikes are meant.
 SPIKES: Final = "spikes of "
 RATE: Final = "rate"
+COUNT: Final = "count"
 
 _HOW: Final = "write '{0}(x, last=N)', of the last N steps, or '{0}(x)', of the whole run"
 
@@ -49,12 +53,23 @@ class Window:
 
 
 @dataclass(frozen=True)
+class Count:
+    """``count(E > 0.5)``: of how many neurons of a group something is true at a step, from ``start`` to ``end`` of the
+    text."""
+
+    tree: Tree
+    start: int
+    end: int
+
+
+@dataclass(frozen=True)
 class Formula:
-    """A measure as it is written."""
+    """A measure as it is written: a count may stand in a window, and both in the ``tree``, as names."""
 
     text: str
     tree: Tree
     windows: tuple[Window, ...]
+    counts: tuple[Count, ...] = ()
 
     @cached_property
     def longest(self) -> int:
@@ -71,27 +86,48 @@ def parse_measure(text: str) -> Formula:
     """
     parser = _Parser(text)
     tree = parser.whole()
-    return Formula(text, tree, tuple(parser.windows))
+    return Formula(text, tree, tuple(parser.windows), tuple(parser.counts))
 
 
 class _Parser(Parser):
     """The parser of expressions, with windows."""
 
     def __init__(self, text: str) -> None:
-        super().__init__(text, False, {"rms": 1, "mean": 1, RATE: 1}, "references")
+        super().__init__(text, False, {"rms": 1, "mean": 1, RATE: 1, COUNT: 1}, "references")
         self.windows: list[Window] = []
+        self.counts: list[Count] = []
         self._within: Token | None = None
+        self._counting: Token | None = None
 
     def call(self, name: Token) -> Tree:
         commas, sign = self._inside()
         if name.text in ("rms", "mean", RATE) or (name.text in SUMMARIES and (sign is not None or not commas)):
             return self._window(name)
+        if name.text == COUNT and sign is None:
+            return self._count(name)
         if sign is not None and self.arity(name.text) is not None:
             message, hint = f"the arguments of '{name.text}' have no names", "write the values alone"
             raise ExpressionError("foreign-operator", message, sign.start, sign.end, hint)
         if sign is not None:
             raise mistakes.unknown_function(name, (*self.extra_functions, *FUNCTIONS), SUMMARIES)
         return super().call(name)
+
+    def _count(self, name: Token) -> Tree:
+        if self._counting is not None:
+            message, hint = "'count' stands inside 'count'", "one alone can be counted; write the two side by side"
+            raise ExpressionError("bad-window", message, name.start, name.end, hint)
+        self._counting = name
+        found = super().call(name)
+        self._counting = None
+        if len(found.parts) != 1:
+            return found  # which has been noted
+        (tree,) = found.parts
+        if any(isinstance(node, Name) and node.name.startswith("window ") for node in walk(tree)):
+            message = "a summary over steps stands inside 'count'"
+            hint = "count what is true at a step, and sum that up: mean(count(E > 0.5), last=N)"
+            raise ExpressionError("bad-window", message, name.start, self.end, hint)
+        self.counts.append(Count(tree, name.start, self.end))
+        return Name(COUNTED(len(self.counts) - 1), name.start, self.end)
 
     def _inside(self) -> tuple[int, Token | None]:
         """How many commas the parentheses that begin here have, and the first sign behind an argument's name."""
