@@ -139,7 +139,7 @@ def slope_by(definition: Definition, tree: Tree, name: str) -> Slope:
     """
     slopes: dict[str, Tree] = {name: Number(1.0)}
     let: list[tuple[str, Tree]] = []
-    for between, formula in _needed(definition.let, tree):
+    for between, formula in needed(definition.let, tree):
         made = slope(formula, slopes, _SLOPES)
         if not isinstance(made, Number):
             let.append((f"d {between}/d {name}", made))
@@ -147,7 +147,7 @@ def slope_by(definition: Definition, tree: Tree, name: str) -> Slope:
         elif made.value != 0:
             slopes[between] = made
     found = slope(tree, slopes, _SLOPES)
-    return Slope(tuple(_needed(let, found)), found)
+    return Slope(tuple(needed(let, found)), found)
 
 
 def signal_flows(synapse: Definition) -> bool:
@@ -179,9 +179,9 @@ def jacobian(definition: Definition) -> Jacobian:
     return Jacobian(tuple(let), diagonal)
 
 
-def _needed(let: Sequence[tuple[str, Tree]], by: Tree) -> list[tuple[str, Tree]]:
-    """Of some intermediate values those that a formula needs."""
-    wanted = set(names(by))
+def needed(let: Sequence[tuple[str, Tree]], *by: Tree) -> list[tuple[str, Tree]]:
+    """Of some intermediate values those that formulas need."""
+    wanted = set().union(*map(names, by))
     found: list[tuple[str, Tree]] = []
     for name, tree in reversed(let):
         if name in wanted:

@@ -7,7 +7,7 @@ them by the models at its ends.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 from typing import Final, Literal, NamedTuple, TypeAlias
@@ -15,7 +15,7 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, IntColumn, frozen, narrow
-from neurovis_spec.compiler.flows import sent_by
+from neurovis_spec.compiler.flows import needed, sent_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
 from neurovis_spec.compiler.program import DRIVE, MODEL, PHASES, Definition
 
@@ -28,7 +28,8 @@ _NOTHING: Final = 0
 def read_at(side: Side, definition: Definition, sends: str) -> tuple[str, ...]:
     """What a definition of connections reads of an end, by the names of that neuron's model: what is sent is ``sends``,
     as a Route has it."""
-    definition = definition.during(PHASES)  # what spikes change is changed behind what orders a step
+    made = definition.during(PHASES)  # what spikes change is changed behind what orders a step
+    definition = replace(made, let=tuple(needed(made.let, *replace(made, let=()).formulas)))
     found = dict.fromkeys(one.name for one in definition.end_names if one.side == side)
     read = definition.read
     if side == "pre" and not read.isdisjoint(("pre", "sent")):

@@ -102,7 +102,9 @@ def _why_held(source: Definition, sends: str, target: Definition, synapse: Defin
     if not source.flows:
         return f"the model '{source.name}' of its source has no derivative"
     if synapse is not None:
-        read = next(name for name in read_at("pre", synapse, sends) if not plain_flow(source, name))
+        read = next((name for name in read_at("pre", synapse, sends) if not plain_flow(source, name)), None)
+        if read is None:
+            return "its synapse waits for spikes"
         what_is_sent = [name for name in ("pre", "sent") if name in synapse.read and read == sends]
         text = next(iter(what_is_sent), EndName("pre", read).text)
         return f"its synapse reads {text}, which in the model '{source.name}' of its source does not flow by itself"
