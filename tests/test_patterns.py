@@ -64,7 +64,7 @@ def test_laws_of_the_fixed_degrees(n: int, m: int, same: bool, loops: bool, data
         if not most:
             continue
         count = data.draw(st.integers(1, most))
-        i, j = make(ends, count, stream)
+        i, j = make(ends, np.full(len(own.sources), count), stream)
         found = list(zip(i.tolist(), j.tolist(), strict=True))
         assert found == sorted(set(found))
         assert set(Counter(i.tolist() if own is ends else j.tolist()).values()) == {count}
@@ -92,8 +92,8 @@ def test_no_pair_depends_on_how_many_rows_are_made_at_once(cells: int, monkeypat
 
     def made() -> list[list[int]]:
         parts = (
-            patterns_drawn.fixed_outdegree(ends, 5, stream),
-            patterns_drawn.fixed_indegree(ends, 5, stream),
+            patterns_drawn.fixed_outdegree(ends, np.full(13, 5), stream),
+            patterns_drawn.fixed_indegree(ends, np.full(13, 5), stream),
             patterns_drawn.small_world(ends, 6, 0.5, stream),
         )
         return [array.tolist() for part in parts for array in part]
@@ -105,7 +105,7 @@ def test_no_pair_depends_on_how_many_rows_are_made_at_once(cells: int, monkeypat
 
 def test_a_partial_shuffle_in_plain_python() -> None:
     stream = Stream(1, "edges", "A -> A")
-    i, j = patterns_drawn.fixed_outdegree(ends_of(7, 7, True), 4, stream)
+    i, j = patterns_drawn.fixed_outdegree(ends_of(7, 7, True), np.full(7, 4), stream)
     for row in range(7):
         slots = [target for target in range(7) if target != row]
         for number in range(4):
@@ -131,7 +131,7 @@ def test_a_small_world_in_plain_python() -> None:
 
 def test_every_choice_is_equally_likely() -> None:
     ends = ends_of(6000, 5, False)
-    i, j = patterns_drawn.fixed_outdegree(ends, 2, Stream(1, "edges", "x"))
+    i, j = patterns_drawn.fixed_outdegree(ends, np.full(6000, 2), Stream(1, "edges", "x"))
     sets = Counter(map(tuple, j.reshape(-1, 2).tolist()))
     assert len(sets) == 10
     assert sum((seen - 600) ** 2 / 600 for seen in sets.values()) < 27.9  # chi², 9 degrees of freedom, 0.1 %

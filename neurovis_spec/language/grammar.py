@@ -81,8 +81,13 @@ RUN_EACH: Final = Role("formula", sees=("k", "t", "i", "n"))
 GROUP: Final = Role("formula", sees=("i", "n"))
 GROUP_DRAWN: Final = Role("formula", sees=("i", "n"), draws=True)
 NOISE: Final = Role("formula", sees=("k", "t", "i", "n"), draws=True)
-PAIR: Final = Role("formula", sees=("i", "j", "n_from", "n_to", "distance"), draws=True)
-DELAY: Final = Role("formula", sees=PAIR.sees, draws=True, ends=True)
+PAIR: Final = Role("formula", sees=("i", "j", "n_from", "n_to", "distance"), draws=True, ends=True)
+#: Which pairs are connected: what is drawn there is drawn by these formulas, not in them.
+WHICH: Final = Role("formula", sees=PAIR.sees, ends=True)
+#: How many connections a source, a target or an entry has.
+OF_SOURCE: Final = Role("formula", sees=("i", "n_from", "n_to"), draws=True, ends=True)
+OF_TARGET: Final = Role("formula", sees=("j", "n_from", "n_to"), draws=True, ends=True)
+OF_ENTRY: Final = Role("formula", sees=("n_from", "n_to"), draws=True)
 CELL: Final = Role("formula", sees=("i", "j", "n_from", "n_to"), draws=True)
 #: What the settings of a rule or a synapse see.
 _OF_PAIRS: Final = ("i", "j", "n_from", "n_to")

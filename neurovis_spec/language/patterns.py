@@ -9,37 +9,72 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Final
 
-from neurovis_spec.language.grammar import FORMULA, Either, Key, Map, Role, words
+from neurovis_spec.language.grammar import (
+    BOOL,
+    FORMULA,
+    OF_ENTRY,
+    OF_SOURCE,
+    OF_TARGET,
+    PLAIN,
+    WHICH,
+    Either,
+    Key,
+    Map,
+    Plain,
+    Role,
+    Shape,
+    words,
+)
 from neurovis_spec.language.located import Leaf
 from neurovis_spec.language.values import Choice, as_choice
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A setting of a pattern, with a usual value: an integer from ``least`` on, or, without one, a probability."""
+    """A setting of a pattern, with a usual value: an integer from ``least`` on, or, without one, a probability; its
+    formula has a ``role``. A ``flag`` is true or false, and may be left out."""
 
     usual: float
     about: str
     least: int | None = None
+    role: Role = PLAIN
+    flag: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Which pairs of neurons a pattern connects. All of its settings have to be there."""
+    """Which pairs of neurons a pattern connects. All of its settings have to be there, but for flags."""
 
     name: str
     about: str
     settings: Mapping[str, Setting] = field(default_factory=dict)
 
     @property
+    def needed(self) -> Mapping[str, Setting]:
+        """The settings that have to be there."""
+        return {name: setting for name, setting in self.settings.items() if not setting.flag}
+
+    @property
+    def counts(self) -> bool:
+        """Whether it makes so many connections as it is told, none of which can be left out."""
+        return not {"count", "degree"}.isdisjoint(self.settings)
+
+    @property
     def use(self) -> str:
         """How it is written, as an example."""
-        settings = ", ".join(f"{name}: {setting.usual:g}" for name, setting in self.settings.items())
+        settings = ", ".join(f"{name}: {setting.usual:g}" for name, setting in self.needed.items())
         return f"{{{self.name}: {{{settings}}}}}" if settings else self.name
 
 
-def _count(of: str) -> dict[str, Setting]:
-    return {"count": Setting(3, f"How many {of}.", 0)}
+#: Whether a pair may be connected several times.
+_MULTAPSES: Final = Setting(0, "Whether a pair may be drawn several times (default false).", flag=True)
+
+
+def _count(of: str, role: Role) -> dict[str, Setting]:
+    return {
+        "count": Setting(3, f"How many {of}; may be an expression, which may draw.", 0, role),
+        "multapses": _MULTAPSES,
+    }
 
 
 PATTERNS: Final[Mapping[str, Pattern]] = {
@@ -52,22 +87,29 @@ PATTERNS: Final[Mapping[str, Pattern]] = {
         Pattern(
             "random",
             "Every pair with this probability, drawn from the seed.",
-            {"probability": Setting(0.1, "The probability of each pair, from 0 to 1.")},
+            {
+                "probability": Setting(
+                    0.1,
+                    "The probability of each pair, from 0 to 1; may be an expression of distance, i, j, ….",
+                    role=WHICH,
+                )
+            },
         ),
         Pattern(
             "fixed_indegree",
             "Every target with so many sources, drawn from the seed.",
-            _count("sources each target has"),
+            _count("sources each target has", OF_TARGET),
         ),
         Pattern(
             "fixed_outdegree",
             "Every source with so many targets, drawn from the seed.",
-            _count("targets each source has"),
+            _count("targets each source has", OF_SOURCE),
         ),
+        Pattern("total", "So many pairs of all, drawn from the seed.", _count("connections there are", OF_ENTRY)),
         Pattern(
             "nearest",
             "Every source with its nearest targets, by position, or by index where no neuron has a position.",
-            _count("targets each source has"),
+            {"count": Setting(3, "How many targets each source has.", 0)},
         ),
         Pattern(
             "small_world",
@@ -89,8 +131,12 @@ PATTERNS: Final[Mapping[str, Pattern]] = {
 }
 
 
+def _shape(setting: Setting) -> Shape:
+    return BOOL if setting.flag else Plain(FORMULA.written, setting.role, formula=True)
+
+
 def _body(pattern: Pattern) -> Key:
-    settings = {name: Key(FORMULA, setting.about, required=True) for name, setting in pattern.settings.items()}
+    settings = {name: Key(_shape(one), one.about, required=not one.flag) for name, one in pattern.settings.items()}
     return Key(Map(settings, nothing=not settings), pattern.about)
 
 

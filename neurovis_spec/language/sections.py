@@ -17,7 +17,6 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from neurovis_spec.diagnostics import listed, shorten
 from neurovis_spec.language.grammar import (
-    DELAY,
     ENDS,
     FORMULA,
     FORMULAS,
@@ -382,7 +381,7 @@ class ConnectionModel(Model):
         Annotated[Located[str], words("from", "to")] | None,
         Needs(("matrix", _CENTRE, _DELAY), "'rows' says how a matrix is read; there is no matrix"),
     ] = Field(None, description="Whether the rows of a matrix are sources (from) or targets (to) (default from).")
-    delay: Annotated[DelayField, DELAY] | None = Field(
+    delay: Annotated[DelayField, PAIR] | None = Field(
         None,
         description="Steps the signal travels, or a time: 1.5 ms, {seconds: distance/3}, {matrix: …}; 0 is within the "
         "same step (default 1).",

@@ -11,7 +11,7 @@ does: weights that are scaled together are one Scaled, what depends on positions
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -23,6 +23,7 @@ from neurovis_spec.compiler.connections.delays import DelayReader, Delays, Timed
 from neurovis_spec.compiler.connections.edges import EdgeColumns, EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends, counted
 from neurovis_spec.compiler.connections.in_use import InUse, Joined, in_use
+from neurovis_spec.compiler.connections.pair_formulas import At, PairFormulas
 from neurovis_spec.compiler.connections.patterns import all_to_all, drawn_alone, empty_reason, pairs_of
 from neurovis_spec.compiler.connections.plasticity import Learning, rules_of
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
@@ -30,22 +31,20 @@ from neurovis_spec.compiler.connections.signals import ConnectionEnds, Place
 from neurovis_spec.compiler.connections.spikes import SpikeCheck
 from neurovis_spec.compiler.connections.twins import both_ways, doubled, in_turn, one_of_each
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
-from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
+from neurovis_spec.compiler.events.settable import Assembled, Part
 from neurovis_spec.compiler.limits import Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
-from neurovis_spec.compiler.neurons.groups import is_written
 from neurovis_spec.compiler.neurons.labels import check_length
 from neurovis_spec.compiler.neurons.populate import Census
-from neurovis_spec.compiler.program import DRIVE, MODEL, SYNAPSE, Definition
+from neurovis_spec.compiler.program import DRIVE, SYNAPSE, Definition
 from neurovis_spec.compiler.values.arguments import Each, Settled, check_initials, settled_of
-from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
+from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.matrices import Grid, draws_any, grid_of
-from neurovis_spec.diagnostics import Home, Span, Undeclared, shorten
-from neurovis_spec.language.expressions.tree import Name, draws, names, walk
-from neurovis_spec.language.grammar import Role
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.tree import draws, names
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
@@ -53,11 +52,10 @@ from neurovis_spec.language.tables import EdgeFile, FileReference, columns_of_ed
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Delay, MatrixRows
 from neurovis_spec.language.yaml.source import Mapping, Scalar
-from neurovis_spec.likeness import suggest
 
 #: Keys of a body that say which connections there are.
 _SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self"})
-_WEIGHT, _DELAY = (formula_at(ConnectionModel, key) for key in ("weight", "delay"))
+_PAIR = formula_at(ConnectionModel, "weight")
 _SETTING = formula_at(ConnectionModel, "synapse", "SYNAPSE", "SETTING")
 #: Keys that a symmetric entry cannot have, why, and what to do.
 _UNLIKE_TWINS = (
@@ -138,6 +136,8 @@ class _Shape(NamedTuple):
     parts: tuple[Part, ...] = ()
     #: what else a file of edges says of each
     columns: EdgeColumns | None = None
+    #: the number of each connection among those of its pair
+    copy: int | Indices = 0
 
     @property
     def has_delay(self) -> BoolArray:
@@ -152,7 +152,8 @@ class _Shape(NamedTuple):
         place_of[kept] = np.arange(len(kept))
         parts = tuple(_moved_to(part, place_of[part.within(len(self.i))]) for part in self.parts)
         columns = None if self.columns is None else self.columns.at(kept)
-        return _Shape(self.i[kept], self.j[kept], weights, delays, parts, columns)
+        copy = self.copy if isinstance(self.copy, int) else self.copy[kept]
+        return _Shape(self.i[kept], self.j[kept], weights, delays, parts, columns, copy)
 
 
 class EntryContext(NamedTuple):
@@ -184,6 +185,11 @@ class EntryBuilder:
     def constants(self) -> Constants:
         """What evaluates the formulas of the scope."""
         return self.context.scope.constants
+
+    @property
+    def formulas(self) -> PairFormulas:
+        """What evaluates those of pairs."""
+        return PairFormulas(self.sources, self.targets, self.context.census, self.constants)
 
     @cached_property
     def route(self) -> Route | Unknown:
@@ -325,7 +331,7 @@ class EntryBuilder:
         made = self.body.matrix is None and self.body.edges is None
         if made and shape.weights is None and np.array_equal(self.sources, self.targets):
             pattern = self.body.pattern
-            return _Shape(*one_of_each(shape.i, shape.j, pattern is not None and drawn_alone(pattern)))
+            return _shape_of(*one_of_each(shape.i, shape.j, pattern is not None and drawn_alone(pattern)))
         sources, targets = self.sources[shape.i], self.targets[shape.j]
         kept = np.flatnonzero(sources != targets)
         both = both_ways(sources[kept], targets[kept])
@@ -349,7 +355,7 @@ class EntryBuilder:
         """Say that there are no connections: an error, but for those that are drawn or counted, as validity depends on
         no seed and no parameter."""
         pattern, findings = self.body.pattern, self.constants.findings
-        reason = None if pattern is None else empty_reason(pattern, self.constants)
+        reason = None if pattern is None else empty_reason(pattern, self.formulas)
         if reason is None:
             findings.error("no-connection", self.key.span, "this entry makes no connection at all")
         else:
@@ -428,11 +434,11 @@ class EntryBuilder:
     def _pattern(self) -> _Shape | Unknown:
         """The pairs of a pattern. Some patterns connect by position, so ends with an invalid one are not known."""
         assert self.body.pattern is not None
-        ends = UNKNOWN if self._misplaced() else self._ends()
-        pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._may_fit)
+        ends = UNKNOWN if self.formulas.misplaced else self._ends()
+        pairs = pairs_of(self.body.pattern, ends, self.formulas, self._stream, self._may_fit)
         if ends is not UNKNOWN and self.body.pattern.name.value == "nearest":  # what places neurons is structural then
             self.context.census.go_by_position(np.concatenate((ends.sources, ends.targets)))
-        return UNKNOWN if pairs is UNKNOWN else _Shape(narrow(pairs[0]), narrow(pairs[1]))
+        return UNKNOWN if pairs is UNKNOWN else _shape_of(narrow(pairs[0]), narrow(pairs[1]))
 
     def _all_pairs(self) -> _Shape | Unknown:
         """All pairs, where nothing says which."""
@@ -507,27 +513,24 @@ class EntryBuilder:
         """Delays in a matrix, by a formula of each pair, or all the same."""
         reader, drawn = DelayReader(self.constants), False
         if isinstance(written.value, Located):
-            tree = self.constants.tree(written.value, _DELAY)
+            tree = self.constants.tree(written.value, _PAIR)
             if tree is UNKNOWN:
                 return UNKNOWN
             drawn = bool(draws(tree))
-            if not (drawn or any(name in _DELAY.sees or "." in name for name in names(tree))):
+            if not (drawn or any(name in _PAIR.sees or "." in name for name in names(tree))):
                 return self._same_delay(written.value, written.in_seconds, shape)
-            self._go_by_ends(names(tree))
-            values = self._values(written.value, shape, "delay", _DELAY)
+            self.formulas.go_by(names(tree))
+            values = self._values(written.value, shape, "delay")
         else:
             grid, drawn = self._grid(written.value, "delay"), draws_any(written.value)
             values = UNKNOWN if grid is UNKNOWN or shape is UNKNOWN else grid.values[shape.i, shape.j]
         if values is UNKNOWN or shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
             return UNKNOWN
-        ends, called = (self.sources[shape.i], self.targets[shape.j]), self.context.census.neurons.names
-        return reader.each(
-            values,
-            written.span,
-            written.in_seconds,
-            drawn,
-            lambda at: f"{called[ends[0][at]]} -> {called[ends[1][at]]}",
-        )
+        called = partial(self._called, shape)
+        return reader.each(values, written.span, written.in_seconds, drawn, called)
+
+    def _called(self, shape: _Shape, pair: int) -> str:
+        return self.formulas.called(int(shape.i[pair]), int(shape.j[pair]))
 
     def _same_delay(self, formula: Formula, in_seconds: bool, shape: _Shape | Unknown) -> Delays | Unknown:
         """A delay that all connections have."""
@@ -539,85 +542,10 @@ class EntryBuilder:
             return Delays(steps)
         return Delays(steps, exact, (Timed(formula.span, text_of(formula)),))
 
-    def _go_by_ends(self, used: Collection[str]) -> None:
-        """What is read of the ends is structural, since something that is does depend on it."""
-        census = self.context.census
-        for side, end in (("pre.", self.sources), ("post.", self.targets)):
-            neurons = np.zeros(0, dtype=np.int64) if end is UNKNOWN else end.astype(np.int64)
-            if "distance" in used:
-                census.go_by_position(neurons)
-            for name in used:
-                if name.startswith(side):
-                    census.go_by_parameter(name.removeprefix(side), neurons)
-
-    def _values(
-        self, formula: Formula, shape: _Shape | Unknown, purpose: str, role: Role = _WEIGHT
-    ) -> FloatArray | Unknown:
-        """The values of a formula of i, j, n_from, n_to (and distance, and what the ``role`` sees), one for every
-        pair."""
-        tree = self.constants.tree(formula, role)
-        if tree is UNKNOWN:
-            return UNKNOWN
-        of_ends = [node for node in walk(tree) if isinstance(node, Name) and "." in node.name]
-        if shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
-            unknown = (*role.sees, *(node.name for node in of_ends))
-            self.constants.value(formula, dict.fromkeys(unknown, UNKNOWN), UNKNOWN)
-            return UNKNOWN
-        used = names(tree)
-        extra: dict[str, Value] = {"n_from": float(len(self.sources)), "n_to": float(len(self.targets))}
-        for name, positions in (("i", shape.i), ("j", shape.j)):  # what nobody reads takes no room
-            extra[name] = positions.astype(np.float64) if name in used else 0.0
-        if "distance" in used:
-            position = self.context.census.neurons.position
-            ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
-            if self._misplaced():
-                return UNKNOWN
-            if not all(np.isfinite(end).all() for end in ends):
-                message = "'distance' needs a position of every neuron of both ends"
-                self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
-                return UNKNOWN
-            with np.errstate(over="ignore"):  # what is then infinite is found where it matters
-                difference = ends[0] - ends[1]
-                extra["distance"] = np.hypot(difference[:, 0], difference[:, 1])
-        for node in of_ends:
-            of_end = self._of_end(node.name, formula.node.at(node.start, node.end), shape)
-            if of_end is UNKNOWN:
-                return UNKNOWN
-            extra[node.name] = of_end
-        randomness = Randomness(self._stream(purpose), shape.i, shape.j)
-        with self.constants.following() as parts:
-            value = self.constants.value(formula, extra, randomness)
-        if "distance" in extra:
-            pairs = self.sources[shape.i].astype(np.int64), self.targets[shape.j].astype(np.int64)
-            distance = Distance(self.context.census.moving, *pairs)
-            if distance.slots:  # the collected parts take the distances as numbers: one that follows them, too, instead
-                parts = [Part(self.constants.bound(tree, {**extra, "distance": distance}, randomness))]
-        self.constants.follow(parts)
-        if value is UNKNOWN:
-            return UNKNOWN
-        return np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape)
-
-    def _of_end(self, name: str, span: Span, shape: _Shape) -> FloatArray | Unknown:
-        """What ``pre.tau`` or ``post.tau`` is, one for every pair: a parameter of the model at that end."""
-        side, _, parameter = name.partition(".")
-        neurons, places = (self.sources, shape.i) if side == "pre" else (self.targets, shape.j)
-        assert neurons is not UNKNOWN
-        for one in self.context.census.groups_of(neurons[np.unique(places)]):
-            model = one.kind.model
-            if not (is_written(one.kind, one.model) and model.sound):
-                return UNKNOWN
-            if parameter not in model.parameters:
-                message = f"the model '{model.definition.name}' of '{one.name}' has no parameter '{shorten(parameter)}'"
-                hint = partial(suggest, parameter, model.definition.parameters, "it has")
-                lost = Undeclared(parameter, Home((MODEL.section, model.definition.name), ("parameters",)))
-                self.constants.findings.error("unknown-name", span, message, hint, undeclared=lost)
-                return UNKNOWN
-        return self.context.census.parameter(parameter)[neurons[places]]
-
-    def _misplaced(self) -> bool:
-        """Whether what the spec says of a position of these neurons is invalid."""
-        misplaced = self.context.census.misplaced
-        return any(end is not UNKNOWN and bool(misplaced[end].any()) for end in (self.sources, self.targets))
+    def _values(self, formula: Formula, shape: _Shape | Unknown, purpose: str) -> FloatArray | Unknown:
+        """The values of a formula, one for every pair."""
+        at = UNKNOWN if shape is UNKNOWN else At(shape.i, shape.j, shape.copy)
+        return self.formulas.values(formula, _PAIR, at, self._stream(purpose))
 
     def _weights(self, shape: _Shape | Unknown) -> FloatArray | Unknown:
         """The weight of every pair, scaled where the entry has a ``scale``."""
@@ -799,6 +727,16 @@ def _delays(shape: _Shape, written: Delays | Unknown | None, unsaid: int | Indic
     for given in (known(written, None), shape.delays):
         result = result if given is None else given.over(result)
     return result
+
+
+def _shape_of(i: Indices, j: Indices) -> _Shape:
+    """The pairs of a pattern, row by row; what is drawn for one that is there several times differs."""
+    again = (i[1:] == i[:-1]) & (j[1:] == j[:-1])
+    if not again.any():
+        return _Shape(i, j)
+    place = np.arange(len(i), dtype=np.int64)
+    first = np.maximum.accumulate(np.where(np.concatenate(([True], ~again)), place, 0))
+    return _Shape(i, j, copy=place - first)
 
 
 def _cells_of(present: BoolArray, values: FloatArray) -> _Shape:

@@ -7,20 +7,21 @@ the ends, row by row.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from neurovis_spec.arrays import FloatArray, IntArray, width
 from neurovis_spec.compiler.connections.ends import Ends, Pairs, counted
-from neurovis_spec.compiler.connections.patterns_drawn import fixed_indegree, fixed_outdegree, small_world
+from neurovis_spec.compiler.connections.pair_formulas import PairFormulas, Rows
+from neurovis_spec.compiler.connections.pattern_settings import SettingsReader, Values
+from neurovis_spec.compiler.connections.patterns_drawn import fixed_indegree, fixed_outdegree, small_world, total
 from neurovis_spec.compiler.connections.patterns_near import band, in_band, nearest
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.values.arguments import check_settings
-from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Findings, shorten
-from neurovis_spec.language.keys import settings_of
-from neurovis_spec.language.located import Formula, formula_of
+from neurovis_spec.diagnostics import shorten
+from neurovis_spec.language.located import formula_of
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import Choice
@@ -56,10 +57,6 @@ def random(ends: Ends, probability: float, stream: Stream) -> Pairs:
     return ends.pairs(*stream.random_pairs(len(ends.sources), len(ends.targets), probability))
 
 
-#: The settings of a pattern.
-Values: TypeAlias = Mapping[str, float]
-
-
 class _Misfit(NamedTuple):
     """Why a pattern cannot be made between two ends: one of its settings, or (None) the pattern as such."""
 
@@ -83,17 +80,34 @@ class _Recipe(NamedTuple):
 
 def _least_random(n: int, m: int, values: Values) -> int:
     """In one case in a million there are fewer; once made, the pairs are counted again."""
-    probability = values["probability"]
+    probability = values.numbers.get("probability", 0)
     return max(0, int(n * m * probability - 5 * (n * m * probability * (1 - probability)) ** 0.5))
 
 
+def _least_counted(n: int, m: int, values: Values) -> int:
+    return int(values.counts.sum())
+
+
 def _count_misfit(ends: Ends, values: Values, of: str, others: str) -> _Misfit | None:
-    """Each of the sources wants as many others as ``count`` says."""
-    count, there = int(values["count"]), len(ends.targets) - bool((ends.excluded() >= 0).any())
-    if count <= there:
+    """Each of the sources wants as many others as its count says."""
+    itself = ends.excluded() >= 0
+    there = len(ends.targets) - itself
+    allowed = np.where(there > 0, np.inf, 0) if values.multapses else there
+    wrong = np.flatnonzero(values.counts > allowed)
+    if not len(wrong):
         return None
-    itself = " but itself" if there < len(ends.targets) else ""
-    return _Misfit(f"a count of {count} where a {of} has {plural(there, others)}{itself}", "count")
+    first = wrong[0]
+    but = " but itself" if itself[first] else ""
+    message = f"a count of {values.counts[first]} where a {of} has {plural(int(there[first]), others)}{but}"
+    return _Misfit(message, "count")
+
+
+def _total_misfit(ends: Ends, values: Values) -> _Misfit | None:
+    there = len(ends.sources) * len(ends.targets) - int((ends.excluded() >= 0).sum())
+    if values.counts[0] <= there or (values.multapses and there):
+        return None
+    hint = "multapses: true connects a pair several times" if there else None
+    return _Misfit(f"a count of {values.counts[0]} where there are {plural(there, 'pair')}", "count", hint=hint)
 
 
 def _nearest_misfit(ends: Ends, values: Values) -> _Misfit | None:
@@ -101,19 +115,20 @@ def _nearest_misfit(ends: Ends, values: Values) -> _Misfit | None:
     places = np.concatenate((ends.source_places, ends.target_places))
     known = np.isfinite(places).all(axis=1)
     if known.all() or not known.any():
-        return _count_misfit(ends, values, "source", "target")
+        counts = np.full(len(ends.sources), int(values.numbers["count"]), dtype=np.int64)
+        return _count_misfit(ends, values._replace(counts=counts), "source", "target")
     message = "'nearest' goes by position, and some neurons of these ends have none"
     return _Misfit(message, None, "no-position", "give all of them a 'position', or none")
 
 
 def _degree_misfit(ends: Ends, values: Values) -> _Misfit | None:
-    degree, others = int(values["degree"]), len(ends.sources) - 1
+    degree, others = int(values.numbers["degree"]), len(ends.sources) - 1
     message = f"a degree of {degree} where each has {plural(others, 'neighbour')}"
     return _Misfit(message, "degree") if degree > others else None
 
 
 def _width(n: int, m: int, values: Values) -> int:
-    return min(int(values["width"]), max(n, m))
+    return min(int(values.numbers["width"]), max(n, m))
 
 
 RECIPES: Final[Mapping[str, _Recipe]] = {
@@ -122,28 +137,34 @@ RECIPES: Final[Mapping[str, _Recipe]] = {
     "chain": _Recipe(lambda n, m, values: n, lambda ends, values, stream: chain(ends), equal=True),
     "ring": _Recipe(lambda n, m, values: n, lambda ends, values, stream: ring(ends), equal=True),
     "random": _Recipe(
-        _least_random, lambda ends, values, stream: random(ends, values["probability"], stream), alone=True
+        _least_random, lambda ends, values, stream: random(ends, values.numbers["probability"], stream), alone=True
     ),
     "fixed_indegree": _Recipe(
-        lambda n, m, values: int(values["count"]) * m,
-        lambda ends, values, stream: fixed_indegree(ends, int(values["count"]), stream),
+        _least_counted,
+        lambda ends, values, stream: fixed_indegree(ends, values.counts, stream, values.multapses),
         lambda ends, values: _count_misfit(ends.reversed(), values, "target", "source"),
         alone=True,
     ),
     "fixed_outdegree": _Recipe(
-        lambda n, m, values: int(values["count"]) * n,
-        lambda ends, values, stream: fixed_outdegree(ends, int(values["count"]), stream),
+        _least_counted,
+        lambda ends, values, stream: fixed_outdegree(ends, values.counts, stream, values.multapses),
         lambda ends, values: _count_misfit(ends, values, "source", "target"),
         alone=True,
     ),
+    "total": _Recipe(
+        _least_counted,
+        lambda ends, values, stream: total(ends, int(values.counts[0]), stream, values.multapses),
+        _total_misfit,
+        alone=True,
+    ),
     "nearest": _Recipe(
-        lambda n, m, values: int(values["count"]) * n,
-        lambda ends, values, stream: nearest(ends, int(values["count"])),
+        lambda n, m, values: int(values.numbers["count"]) * n,
+        lambda ends, values, stream: nearest(ends, int(values.numbers["count"])),
         _nearest_misfit,
     ),
     "small_world": _Recipe(
-        lambda n, m, values: int(values["degree"]) * n,
-        lambda ends, values, stream: small_world(ends, int(values["degree"]), values["rewire"], stream),
+        lambda n, m, values: int(values.numbers["degree"]) * n,
+        lambda ends, values, stream: small_world(ends, int(values.numbers["degree"]), values.numbers["rewire"], stream),
         _degree_misfit,
         equal=True,
         alone=True,
@@ -165,14 +186,19 @@ _ELSEWHERE: Final[Mapping[str, str]] = {
 
 
 def pairs_of(
-    choice: Choice, ends: Ends | Unknown, constants: Constants, stream: Stream, fits: Callable[[int], bool]
+    choice: Choice,
+    ends: Ends | Unknown,
+    formulas: PairFormulas,
+    stream: Callable[[str], Stream],
+    fits: Callable[[int], bool],
 ) -> Pairs | Unknown:
     """The pairs of a pattern as the author wrote it; UNKNOWN where it is invalid, which is reported, or where
     the ends are not known.
 
-    ``fits`` says, before they are made, whether there is room for so many.
+    ``stream`` has the random numbers of a purpose; ``fits`` says, before they are made, whether there is room for so
+    many.
     """
-    findings = constants.findings
+    findings = formulas.constants.findings
     written, span = choice.name.value, choice.name.span
     name = written if written in PATTERNS else meant(written, PATTERNS)
     if written not in PATTERNS:
@@ -180,11 +206,10 @@ def pairs_of(
         hint = suggest(written, PATTERNS, "patterns") if elsewhere is None else did_you_mean([elsewhere])
         findings.error("unknown-pattern", span, f"there is no pattern '{shorten(written)}'", hint)
     if name is None:
-        check_settings(choice, constants)
+        check_settings(choice, formulas.constants)
         return UNKNOWN
-    recipe, formulas = RECIPES[name], _settings(name, choice, findings)
-    found = {setting: _value(name, setting, formula, constants) for setting, formula in formulas.items()}
-    values = {setting: value for setting, value in found.items() if value is not UNKNOWN}
+    recipe, settings = RECIPES[name], SettingsReader(PATTERNS[name], choice, formulas, stream)
+    values = settings.read()
     if ends is UNKNOWN:
         return UNKNOWN
     n, m = len(ends.sources), len(ends.targets)
@@ -192,16 +217,52 @@ def pairs_of(
         message = f"'{name}' needs ends of equal size; these have {n} and {m} neurons"
         findings.error("wrong-size", span, message)
         return UNKNOWN
-    if len(values) < len(PATTERNS[name].settings) or name != written:
+    if values is UNKNOWN or name != written:
         return UNKNOWN
     misfit = recipe.misfit(ends, values)
     if misfit is not None:
-        place = span if misfit.setting is None else formulas[misfit.setting].span
+        place = span if misfit.setting is None else settings.spans[misfit.setting]
         findings.error(misfit.code, place, misfit.message, misfit.hint)
         return UNKNOWN
-    if values.get("count") == 0:
+    if values.chances is not None:
+        return _of_blocks(ends, values.chances, stream("edges").chosen, fits)
+    if "count" in PATTERNS[name].settings and not recipe.least(n, m, values):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    return recipe.make(ends, values, stream) if fits(recipe.least(n, m, values)) else UNKNOWN
+    return recipe.make(ends, values, stream("edges")) if fits(recipe.least(n, m, values)) else UNKNOWN
+
+
+def pairs_where(ends: Ends, condition: Rows, fits: Callable[[int], bool]) -> Pairs | Unknown:
+    """The pairs of which a condition holds."""
+
+    def holds(rows: IntArray, values: FloatArray) -> Pairs:
+        row, target = np.nonzero(values)
+        return row, target
+
+    return _of_blocks(ends, condition, holds, fits)
+
+
+def _of_blocks(
+    ends: Ends,
+    numbers: Rows,
+    chosen: Callable[[IntArray, FloatArray], Pairs],
+    fits: Callable[[int], bool],
+) -> Pairs | Unknown:
+    """Of all pairs, of which there are ``numbers``, those ``chosen`` by them: the indices of their rows, of some at a
+    time, and their targets."""
+    kind = width(-1, max(numbers.n, numbers.m))
+    i, j = [np.empty(0, dtype=kind)], [np.empty(0, dtype=kind)]
+    count = 0
+    for rows, values in numbers.blocks():
+        if values is UNKNOWN:
+            return UNKNOWN
+        row, target = chosen(rows, values)
+        found = ends.pairs(rows[row].astype(kind), target.astype(kind))
+        count += len(found[0])
+        if not fits(count):
+            return UNKNOWN
+        i.append(found[0])
+        j.append(found[1])
+    return np.concatenate(i), np.concatenate(j)
 
 
 def drawn_alone(choice: Choice) -> bool:
@@ -210,41 +271,19 @@ def drawn_alone(choice: Choice) -> bool:
     return recipe is not None and recipe.alone
 
 
-def empty_reason(choice: Choice, constants: Constants) -> tuple[str, str] | None:
+def empty_reason(choice: Choice, formulas: PairFormulas) -> tuple[str, str] | None:
     """Why a valid pattern may make no pair at all, and what to do: chance decides, or it is told to make none. None
     where that follows from the ends alone."""
+    constants, settings = formulas.constants, PATTERNS[choice.name.value].settings
     for entry in choice.settings.entries:
-        formula = formula_of(entry.value, constants.findings)
-        value = UNKNOWN if formula is UNKNOWN else constants.scalar(formula)
-        if entry.name == "probability" and value is not UNKNOWN and value > 0:
+        if entry.name not in ("probability", "count"):
+            continue
+        formula, role = formula_of(entry.value, constants.findings), settings[entry.name].role
+        if formula is UNKNOWN:
+            return None
+        drawn = formulas.differs(formula, role)
+        value = UNKNOWN if drawn else constants.scalar(formula, extra=formulas.sizes(role))
+        if entry.name == "probability" and (drawn or (value is not UNKNOWN and value > 0)):
             return "this entry draws no connection at all", "another seed, or a larger probability, draws some"
-        if entry.name in ("probability", "count") and value is not UNKNOWN:
-            return f"with a {entry.name} of 0 this entry makes no connection at all", f"give it a larger {entry.name}"
+        return f"with a {entry.name} of 0 this entry makes no connection at all", f"give it a larger {entry.name}"
     return None
-
-
-def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formula]:
-    """The formulas of the settings; each of them has to be there."""
-    allowed = PATTERNS[name].settings
-    entries = settings_of(choice.settings, allowed, "setting", f"'{name}' has no settings", findings)
-    for missing in [setting for setting in allowed if setting not in entries][:1]:
-        message = f"'{name}' needs a {missing}"
-        findings.error("missing-key", choice.name.span, message, f"write {PATTERNS[name].use}")
-    formulas = {setting: formula_of(entry.value, findings) for setting, entry in entries.known().items()}
-    return {setting: formula for setting, formula in formulas.items() if formula is not UNKNOWN}
-
-
-def _value(name: str, setting: str, formula: Formula, constants: Constants) -> float | Unknown:
-    """What a setting is; UNKNOWN where it is invalid, which is reported."""
-    least = PATTERNS[name].settings[setting].least
-    if least is None:
-        value = constants.scalar(formula, structural=True)
-        message = "a probability lies between 0 and 1, this is {:g}"
-        valid = value is UNKNOWN or 0 <= value <= 1
-    else:
-        value = constants.integer(formula, f"a {setting}", least)
-        message = "a degree is even, half of it on each side of the ring; this is {}"
-        valid = value is UNKNOWN or setting != "degree" or not value % 2
-    if not valid:
-        constants.findings.error("out-of-range", formula.span, message.format(value))
-    return value if valid else UNKNOWN

@@ -20,12 +20,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.program import DRIVE, Key, Owner
 from neurovis_spec.language.expressions.evaluate import Drawing, Value, evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
@@ -162,6 +162,13 @@ class Subset:
         return whole if np.size(whole) == 1 else np.asarray(whole)[self.places]
 
 
+def apart(positions: FloatArray, one: Indices, other: Indices) -> FloatArray:
+    """How far neurons are from others, of positions (n, axes); the indices broadcast. NumPy's hypot is that of the C
+    library, so that compiled code gives the same bits."""
+    along = (positions[one, axis] - positions[other, axis] for axis in range(positions.shape[1]))
+    return reduce(np.hypot, along)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Distance:
     """How far source and target of connections are from each other. ``positions`` are x and y of all neurons in turn:
@@ -181,10 +188,7 @@ class Distance:
 
     def values(self, parameters: FloatArray, by: Library = NUMPY) -> FloatArray:
         """The distances with these parameters."""
-        place = self.positions.values(parameters, by).reshape(-1, 2)
-        apart = place[self.sources] - place[self.targets]
-        # NumPy's hypot is that of the C library, so that compiled code gives the same bits
-        return np.hypot(apart[:, 0], apart[:, 1])
+        return apart(self.positions.values(parameters, by).reshape(-1, 2), self.sources, self.targets)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

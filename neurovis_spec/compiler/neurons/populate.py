@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray, frozen, narrow
-from neurovis_spec.compiler.events.settable import Assembled
+from neurovis_spec.compiler.events.settable import Assembled, Subset
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.levels import default_delay
 from neurovis_spec.compiler.limits import Limits
@@ -107,6 +107,24 @@ class Census:
         ]
         return Assembled(self.neurons.position.ravel(), tuple(parts))
 
+    def straight(self, one: Indices, other: Indices) -> FloatArray:
+        """How far neurons are from others; the indices broadcast. Squares, a sum and a root are rounded in one way on
+        every machine, as no other function is; a power of two, which rounds nothing, keeps squares from overflowing."""
+        position, power = self._scaled
+        squared = np.zeros(())
+        for axis in range(position.shape[1]):
+            difference = position[one, axis] - position[other, axis]
+            np.multiply(difference, difference, out=difference)
+            squared = difference if not axis else np.add(squared, difference, out=squared)
+        return np.ldexp(np.sqrt(squared, out=squared), power, out=squared)
+
+    @cached_property
+    def _scaled(self) -> tuple[FloatArray, int]:
+        """The positions, divided by a power of two so that none is beyond 1, and its exponent."""
+        most = np.abs(self.neurons.position).max(initial=0, where=np.isfinite(self.neurons.position))
+        power = int(np.frexp(most)[1])
+        return np.ldexp(self.neurons.position, -power), power
+
     @cached_property
     def misplaced(self) -> npt.NDArray[np.bool_]:
         """For each neuron whether what the spec says of its position is invalid."""
@@ -152,6 +170,16 @@ class Census:
             if name in one.kind.model.parameters:
                 result[one.group.start : one.group.start + one.group.count] = one.kind.model.parameters[name]
         return result
+
+    def followed(self, name: str, neurons: IntArray) -> Subset:
+        """This parameter of the models of these neurons, of which some may follow parameters of a run."""
+        parts = [
+            part._replace(places=one.group.start + part.within(one.group.count))
+            for one in self.groups_of(neurons.ravel())
+            for part in one.kind.model.parts
+            if part.name == name
+        ]
+        return Subset(Assembled(self.parameter(name), tuple(parts)), neurons)
 
     def go_by_parameter(self, name: str, neurons: IntArray) -> None:
         """Mark the parameters of the run that this one of the models of these neurons follows as structural."""

@@ -208,12 +208,13 @@ def value_of(tree: Tree | Unknown, values: Mapping[str, Value | Unknown]) -> Val
 
 
 class Randomness(NamedTuple):
-    """Where the numbers of a formula are drawn from: a stream and the counters i, j of each value (UNKNOWN in the place
-    of a Randomness: it may draw, and nobody knows what)."""
+    """Where the numbers of a formula are drawn from: a stream and the counters i, j of each value, and ``copy`` where
+    several have the same (UNKNOWN in the place of a Randomness: it may draw, and nobody knows what)."""
 
     stream: Stream
     i: int | Indices
     j: int | Indices = 0
+    copy: int | Indices = 0
 
 
 @dataclass
@@ -363,6 +364,10 @@ class Constants:
             self._collected.append(Part(self.bound(tree, context, randomness), places))
         return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
 
+    def evaluated(self, tree: Tree, extra: Mapping[str, Value]) -> Value:
+        """What an expression is that draws nothing and all names of which are known, finite or not."""
+        return evaluate_array(tree, self._known(names(tree), extra))
+
     def _known(self, used: Iterable[str], extra: Mapping[str, V]) -> dict[str, V | float]:
         """What names mean, all of which are known."""
         result: dict[str, V | float] = {}
@@ -405,16 +410,24 @@ class Constants:
         result = self.unchecked(formula, extra, randomness, structural, places)
         return result if result is not UNKNOWN and check_finite(result, formula, self.findings) else UNKNOWN
 
-    def scalar(self, formula: Formula, structural: bool = False) -> float | Unknown:
-        """The value of a formula that is one number."""
-        value = self.value(formula, structural=structural)
+    def scalar(
+        self, formula: Formula, structural: bool = False, extra: Mapping[str, Value | Unknown] | None = None
+    ) -> float | Unknown:
+        """The value of a formula that is one number, as are ``extra``."""
+        value = self.value(formula, extra, structural=structural)
         return UNKNOWN if value is UNKNOWN else float(value)
 
     def integer(
-        self, formula: Formula, what: str, least: int, most: int = 2**53, structural: bool = True
+        self,
+        formula: Formula,
+        what: str,
+        least: int,
+        most: int = 2**53,
+        structural: bool = True,
+        extra: Mapping[str, Value | Unknown] | None = None,
     ) -> int | Unknown:
         """The value of a formula that must be an integer from ``least`` to ``most``."""
-        value = self.scalar(formula, structural=structural)
+        value = self.scalar(formula, structural, extra)
         if value is UNKNOWN:
             return UNKNOWN
         nearest = round(value)
@@ -480,8 +493,8 @@ class _Drawing:
         wrong = np.less(width, 0)
         if self.wrong is None and wrong.any():
             self.wrong = node, float(np.nanmin(width))
-        stream, i, j = self.randomness
-        drawn = stream.drawn(node.kind, first, second, (i, j, 0, node.index))
+        stream, i, j, copy = self.randomness
+        drawn = stream.drawn(node.kind, first, second, (i, j, copy, node.index))
         return np.where(wrong, np.nan, drawn) if wrong.any() else drawn
 
 

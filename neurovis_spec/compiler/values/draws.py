@@ -170,6 +170,29 @@ class Stream:
             return np.where(np.less(second, 0), np.nan, drawn) if np.less(second, 0).any() else drawn
         return np.asarray(first + (second - first) * self.uniform(*counter))
 
+    def chosen(self, rows: IntArray, chances: FloatArray) -> tuple[IntArray, IntArray]:
+        """The pairs of these rows, each of which is there with a probability of its own, of ``chances`` (rows, n): the
+        indices of their rows among these and their targets, row by row.
+
+        A pair (i, j) is there where u is less than its probability. Sixteen neighbours share a block: with b the byte
+        j mod 16 of the counter (i, ⌊j/16⌋, 0, 0), the lowest of w0 first, u lies from b/2^8 to (b + 1)/2^8. Where that
+        does not decide, u is (b + v)/2^8, v the uniform number of the counter (i, j, 0, 1).
+        """
+        n = chances.shape[1]
+        blocks = np.arange(-(-n // 16), dtype=np.int64)
+        words = np.empty((len(rows), len(blocks), 4), dtype="<u4")
+        for some, others in _pieces(words.shape[:2]):
+            i, j, none = _word(rows[some, None]), _word(blocks[None, others]), np.zeros((), dtype=np.uint64)
+            for place, word in enumerate(_rounds((i, j, none, none), self.key)):
+                words[some, others, place] = word
+        byte, scaled = words.view(np.uint8).reshape(len(rows), -1)[:, :n], chances * 2.0**8
+        row, target = np.divmod(np.flatnonzero(byte < scaled), n)
+        rest = scaled[row, target] - byte[row, target]
+        unsure = np.flatnonzero(rest < 1)
+        there = np.ones(len(row), dtype=np.bool_)
+        there[unsure] = self.uniform(rows[row[unsure]], target[unsure], 0, 1) < rest[unsure]
+        return row[there], target[there]
+
     def random_targets(self, row: int, n: int, probability: float) -> IntArray:
         """The targets 0 … n−1 that row ``row`` connects to, each with this probability, ascending.
 
