@@ -156,6 +156,19 @@ def test_the_legend_tells_that_spikes_fade_where_no_activity_does() -> None:
         assert words in shown
 
 
+def test_times_of_traces_are_told_in_the_unit_of_dt() -> None:
+    """In the legend and in tooltips, as axes and captions do; in seconds where ``dt`` is written so."""
+    quiet = SPEC.replace("model: kicked, bias", "model: shown, bias").replace("C: {model: count}", "C: {}")
+    for text, head in ((SPEC, "fades to 1/e in"), (quiet, "")):
+        for dt, told in (("1 ms", "12 ms"), ("0.001", "0.012 s"), ("1000 us", "12000 us")):
+            network = nv.compile_text(text.replace("dt: 1 ms", f"dt: {dt}"))
+            groups = tuple(shape for shape in scene("network", network.run(backend="reference"), network).groups)
+            legend = {one.text for group in groups for one in group.shapes if isinstance(one, Text)}
+            assert f"to 1/e in {told}" in legend
+            titles = [group.title for group in groups if group.title is not None]
+            assert any(f"{head} {told}" in title for title in titles) == bool(head)
+
+
 def test_the_live_page_has_the_spikes_of_a_recording_without_their_state() -> None:
     """As events, also between its rows; of what is recorded as a state, the same."""
     names = Quantities(NETWORK.network).names

@@ -18,7 +18,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene import encoding, texts
 from neurovis_spec.scene.ends import EndArray, ends_of
-from neurovis_spec.scene.fading import seconds_of
+from neurovis_spec.scene.fading import seconds_of, told_times
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Disc, Group, Point, Scene, Shape, Spline, Text, ended
@@ -191,14 +191,14 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
     neurons, connections = network.neurons, network.connections
     of_neurons = [""] * len(neurons)
     lows, highs = activity.min(axis=0).tolist(), activity.max(axis=0).tolist()
-    traces, states = seconds_of(network).tolist(), ShownStates(network).called
+    traces, states = told_times(network, seconds_of(network)).tolist(), ShownStates(network).called
     for group in neurons.groups:
         kind = group.activation if group.model == "static" else f"{group.model}, {group.activation}"
         for index in group.indices:
             name, label = neurons.names[index], neurons.labels[index]
             first = name if label in (name, name.rsplit(".", 1)[-1]) else f"{name}: {label}"
             seen = _gain_of(float(gains.activity[index]), float(gains.centre[index]))
-            fades = f"fades to 1/e in {texts.number(traces[index])} s" if traces[index] else ""
+            fades = f"fades to 1/e in {texts.number(traces[index])} {network.dt_unit}" if traces[index] else ""
             told = f"{states[index] or 'activity'} {_range(lows[index], highs[index])}"
             parts = [first, told, kind, group.description or "", seen, fades]
             of_neurons[index] = "\n".join(part for part in parts if part)

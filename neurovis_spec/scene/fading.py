@@ -14,6 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.language.units import TIMES
 from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.scene.ends import SetEnds
 from neurovis_spec.scene.film_size import frames_a_second
@@ -48,6 +49,11 @@ def sent_seconds_of(network: Network) -> FloatArray:
     spikes, and of what is made of one."""
     signals = Signals(network)
     return np.where(signals.spikes, _usual(network), 0.0) if signals else np.zeros(0)
+
+
+def told_times(network: Network, seconds: FloatArray) -> FloatArray:
+    """Times in the unit in which people are told: that in which the spec writes ``time.dt``, ``network.dt_unit``."""
+    return seconds / float(TIMES[network.dt_unit])
 
 
 def _usual(network: Network) -> float:

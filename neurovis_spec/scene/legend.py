@@ -46,10 +46,12 @@ class Contents:
     lesions: bool = False
     #: None without lines
     ends: Ends | None = None
-    #: in how many seconds activity fades, the shortest and the longest, of those that have a trace
+    #: in which time activity fades, the shortest and the longest, of those that have a trace
     traces: tuple[float, ...] = ()
     #: the same of signals that are spikes, where activities are none
     sent_traces: tuple[float, ...] = ()
+    #: the unit of these times
+    unit: str = "s"
 
 
 def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = False) -> list[LegendEntry]:
@@ -68,9 +70,9 @@ def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = Fal
     if contents.delays:
         result.append(_bead(contents.delays, theme))
     if contents.traces:
-        result.append(_trace("activity fades", contents.traces, theme))
+        result.append(_trace("activity fades", contents.traces, contents.unit, theme))
     elif contents.sent_traces:
-        result.append(_trace("spikes fade", contents.sent_traces, theme))
+        result.append(_trace("spikes fade", contents.sent_traces, contents.unit, theme))
     if contents.lesions:
         result.append(_faint(theme))
     return result
@@ -192,9 +194,9 @@ def _bead(words: str, theme: Theme) -> LegendEntry:
     return LegendEntry(shapes, across)
 
 
-def _trace(first: str, seconds: tuple[float, ...], theme: Theme) -> LegendEntry:
+def _trace(first: str, times: tuple[float, ...], unit: str, theme: Theme) -> LegendEntry:
     """A disc, and how it fades."""
-    second = f"to 1/e in {' … '.join(texts.number(one) for one in seconds)} s"
+    second = f"to 1/e in {' … '.join(texts.number(one) for one in times)} {unit}"
     across = max(64.0, texts.width(first, SMALL), texts.width(second, SMALL))
     fills = colours(theme, [1.0, 0.6, 0.3, 0.1])
     discs = [Disc((6 + 17.0 * place, SAMPLE_Y), 6, fill, theme.ring, 0.8) for place, fill in enumerate(fills)]

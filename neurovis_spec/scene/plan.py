@@ -25,7 +25,7 @@ from neurovis_spec.scene.boxes import Box, boxes_of, entitled
 from neurovis_spec.scene.caption import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
 from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.ends import EndArray, SetEnds, signed
-from neurovis_spec.scene.fading import seconds_of, sent_seconds_of
+from neurovis_spec.scene.fading import seconds_of, sent_seconds_of, told_times
 from neurovis_spec.scene.frame import MARGIN, MOST, Frame, Margins, fit, unit_for
 from neurovis_spec.scene.gains import Gains, in_pages
 from neurovis_spec.scene.gathered_layout import radius_of
@@ -481,8 +481,9 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
             delays=delayed,
             lesions=bool(content.lesions),
             ends=content.ends,
-            traces=_least_and_most(seconds_of(network)),
-            sent_traces=_least_and_most(sent_seconds_of(network)),
+            traces=_least_and_most(told_times(network, seconds_of(network))),
+            sent_traces=_least_and_most(told_times(network, sent_seconds_of(network))),
+            unit=network.dt_unit,
         )
         for brief in (False, True):
             items = legend.entries(contents, gains, theme, brief=brief)
