@@ -408,6 +408,17 @@ def test_a_unit_is_told_so_that_it_can_be_read(powers: list[int], words: list[st
     assert unit_of(spelled(unit, words)) == unit
 
 
+def test_a_factor_is_told_as_one_however_large_it_is() -> None:
+    """``s/ms`` is no unit of a number; and 10 to the power of what is written is not worked out."""
+    inner = "{parameters: {a: {value: 1, unit: mV}, b: {value: 1, unit: V}}, let: {x: WRITTEN}, activity: x}"
+    text = f"models: {{m: {inner}}}\nneurons: {{A: {{model: m}}}}"
+    for written, message in (
+        ("log(b/a)", "log() is of a number, and b/a is 10^3 times a number"),
+        ("a^99999999 + b^99999999", "b^99999999 is in V^99999999, a^99999999 in 10^-299999997·V^99999999"),
+    ):
+        assert told(text.replace("WRITTEN", written)) == [message]
+
+
 UNREAD = ("furlong", "mV/", "m V%", "mol/(m^3)", "V^x", "2 mV", "")
 
 

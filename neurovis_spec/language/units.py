@@ -29,6 +29,8 @@ TIMES: Final[Mapping[str, Fraction]] = {
 }
 #: What units are made of: powers of ten and of sixty (min), and quantities.
 _AXES: Final = ("10", "60", "V", "A", "s", "m", "mol", "rad")
+#: Powers of ten beyond this are no factors.
+_MOST_POWERS: Final = 300
 #: What to say of units of time.
 TIME_ABOUTS: Final[Mapping[str, str]] = {
     "s": "Seconds.", "ms": "Milliseconds.", "us": "Microseconds.", "min": "Minutes.",
@@ -145,9 +147,11 @@ class Unit:
 
     @property
     def factor(self) -> Fraction | None:
-        """The factor that it is; None where it is none, or is no fraction."""
+        """The factor that it is; None where it is none, or is no fraction that a number can hold."""
         tens, sixties = self.powers[:2]
         if not self.is_scale or tens.denominator != 1 or sixties.denominator != 1:
+            return None
+        if abs(tens) + 2 * abs(sixties) > _MOST_POWERS:  # 60 is less than 10^2
             return None
         return Fraction(10) ** tens.numerator * Fraction(60) ** sixties.numerator
 
@@ -221,8 +225,8 @@ def spelled(unit: Unit, words: Iterable[str] = ()) -> str:
     """How a unit is written: by one of these ``words`` where one of them is it, else in ours.
 
     >>> made = unit_of("nS*mV/s")
-    >>> spelled(made), spelled(made, ["pA"]), spelled(unit_of("nS*mV")), spelled(NUMBER)
-    ('fA/ms', 'pA/s', 'pA', '1')
+    >>> spelled(made), spelled(made, ["pA"]), spelled(unit_of("nS*mV")), spelled(NUMBER), spelled(unit_of("V/mV"))
+    ('fA/ms', 'pA/s', 'pA', '1', '10^3')
     """
     if unit == NUMBER:
         return "1"
@@ -230,14 +234,15 @@ def spelled(unit: Unit, words: Iterable[str] = ()) -> str:
     for word, one in known.items():
         if one == unit:
             return word
-    for per in _PER[:5]:
+    pers = () if unit.is_scale else _PER  # a factor is not told by units, as in s/ms
+    for per in pers[:5]:
         for word, one in known.items():
             if unit == one / _unit(per) and "/" not in word:
                 return f"{word}/{per}"
     plain = _by_one()
     if unit in plain:
         return plain[unit]
-    for per in _PER:
+    for per in pers:
         if (whole := unit * _unit(per)) in plain:
             return f"{plain[whole]}/{per}"
     axes = [f"{axis}^{power}" if power != 1 else axis for axis, power in zip(_AXES, unit.powers, strict=True) if power]

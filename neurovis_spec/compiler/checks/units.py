@@ -243,7 +243,9 @@ def _misfit(misfit: Misfit, text: str, sheet: Sheet) -> str:
 
 def _in(unit: Unit, sheet: Sheet) -> str:
     """That something is in a unit."""
-    return "a number without unit" if unit == NUMBER else f"in {sheet.told(unit)}"
+    if unit == NUMBER:
+        return "a number without unit"
+    return f"{sheet.told(unit)} times a number" if unit.is_scale else f"in {sheet.told(unit)}"
 
 
 def _unequal(fault: Fault, unequal: Unequal, sheet: Sheet) -> str:
