@@ -13,12 +13,12 @@ import neurovis_spec as nv
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime import c_backend
 from neurovis_spec.runtime.backend import Backend, BackendError, Capabilities
-from neurovis_spec.runtime.c_backend import CBackend
+from neurovis_spec.runtime.c_backend import CBackend, CStepper
 from neurovis_spec.runtime.columns import Keep
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import InputReader
-from neurovis_spec.runtime.numpy_backend import NumpyBackend
+from neurovis_spec.runtime.numpy_backend import NumpyBackend, NumpyStepper
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.reference import ReferenceBackend
 from neurovis_spec.runtime.simulation import Simulation
@@ -167,3 +167,47 @@ def test_a_backend_without_spikes_refuses_them() -> None:
     for text in (TWO_PORTS, jumps):
         with pytest.raises(BackendError, match=r"'plain' cannot run 'two_ports': no spikes"):
             Simulation(nv.compile_text(text).network, Plain())
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_run_that_keeps_no_weights_makes_many_steps_by_a_call(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = MIXED.replace("DELAY", "2").replace("REST", "plasticity: trade")
+    network = nv.compile_text(text).network
+    runs = [record(network, Course(40, backend=backend, every=every)) for every in (1, 7)]
+    for name in ("step", "advance"):
+        for made in (CStepper, NumpyStepper):
+            monkeypatch.setattr(made, name, lambda *_: pytest.fail("a step of its own"), raising=False)
+    for every, kept in zip((1, 7), runs, strict=True):
+        run = record(network, Course(40, backend=backend, every=every, keep=Keep(weights=False)))
+        np.testing.assert_array_equal(run.activity, kept.activity)
+        np.testing.assert_array_equal(run.fired.neurons, runs[0].fired.neurons)
+        np.testing.assert_array_equal(run.weights_after, kept.weights_after)
+        assert run.weights.shape == (len(run.activity), 0)
+
+
+GROWING = {
+    "weight": ("rules", "{weight: {on_pre: 1e200*weight}}"),
+    "state": ("rules", "{state: {a: {initial: 1, on_post: 1e200*a}}, weight: {on_pre: weight}}"),
+    "trace": ("rules", "{time: ms, state: {a: {initial: 1, derivative: -a/9, on_pre: 1e200*a}}, weight: {on_post: a}}"),
+    "synapse": ("synapses", "{state: {g: {initial: 1, on_pre: 1e200*g}}, signal: 1/(9 + g)}"),
+    "flow": ("synapses", "{state: {g: {initial: 1, derivative: 3e5*g}}, signal: 1/(9 + g)}"),
+}
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("grows", GROWING)
+def test_what_spikes_make_infinite_is_told_at_its_step(grows: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where only connections are looked at that a spike has come to."""
+    monkeypatch.setattr(c_backend, "SMALL", 0)
+    section, body = GROWING[grows]
+    key = {"rules": "plasticity", "synapses": "synapse"}[section]
+    head, tail = MIXED.split("rules:")[0], MIXED[MIXED.index("neurons:") : MIXED.index("events:")]
+    tail = tail.replace("count: 60", "count: 9").replace("DELAY", "3").replace("REST", f"{key}: grows")
+    network = nv.compile_text(f"{head}{section}: {{grows: {body}}}\n{tail}").network
+    told = []
+    for backend in ("reference", "c"):
+        with pytest.warns(RuntimeWarning) as found:
+            record(network, Course(60, backend=backend, keep=Keep(weights=False)))
+        told.append([str(one.message) for one in found])
+    assert told[0] == told[1]
+    assert "inf" in told[0][0]

@@ -104,8 +104,8 @@ class Runner(Protocol):
         self, state: State, vectors: FloatArray, activity: FloatArray, weights: FloatArray, every: int, look: bool
     ) -> int:
         """Make a step for each row of ``vectors``, at least one; keep those that ``every`` divides: a[t] in the first
-        rows of ``activity``, the w[t] that change in those of ``weights``. With ``look``, end behind the first step
-        after which something is not finite. Gives the number of steps made."""
+        rows of ``activity``, the w[t] that change in those of ``weights``, unless these have no columns. With
+        ``look``, end behind the first step after which something is not finite. Gives the number of steps made."""
         ...
 
 

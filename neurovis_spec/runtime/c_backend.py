@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import RULE, Definition
+from neurovis_spec.compiler.program import Definition
 from neurovis_spec.compiler.values.spikes import always_finite
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.language.expressions.functions import Library
@@ -31,7 +31,7 @@ from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.runtime import c_flows, c_functions, c_library, c_plan
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, state_name, words_of
-from neurovis_spec.runtime.c_step import Built, StepCode, begins_otherwise
+from neurovis_spec.runtime.c_step import Built, StepCode, begins_otherwise, is_watched
 from neurovis_spec.runtime.lags import ring_lengths
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import Conditions, Mask, State, Structure
@@ -59,9 +59,10 @@ _NEVER: Final = 1 << 62
 #:
 #: ``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; the inputs of
 #: each are a row of ``rows``, but for those that the step computes, which it puts there. Steps that ``every`` divides
-#: are kept: a row of ``activity``; one of ``weights`` with those that are ``changing``, which lie next to each other if
-#: ``beside``; and one of ``states``, with the ``columns`` numbers that ``probed`` points to, of which signals of
-#: synapses stand in ``formed``; where rules change weights that these read, those of the step are kept in ``weighed``.
+#: are kept: a row of ``activity``; one of ``weights`` with the ``changes`` that are ``changing`` (0 where nobody asks
+#: for them), which lie next to each other if ``beside``; and one of ``states``, with the ``columns`` numbers that
+#: ``probed`` points to, of which signals of synapses stand in ``formed``; where rules change weights that these read,
+#: those of the step are kept in ``weighed``.
 #: With ``look`` it ends behind the first step after which something is not finite.
 _HEAD: Final = """#include <math.h>
 #include <stddef.h>
@@ -86,7 +87,7 @@ typedef struct {
 } nv_state;
 
 typedef struct {
-    int64_t k, steps, every, form, then, look, beside, columns;
+    int64_t k, steps, every, form, then, look, beside, changes, columns;
     double *rows, *activity, *weights, *states, *formed, *weighed;
     const int64_t *changing;
     const double *const *probed;
@@ -119,7 +120,9 @@ NV_PUBLIC int64_t nv_once(nv_state *p)
         nv_general(p, p->k, p->s, p->form == 2);
     }
     p->k++;
-    return odd != 0.0 || nv_odd(p->s, INPUTS) || LOOK_NEURONS(p->form) || ((!WATCHED || p->form) && LOOK_CONNECTIONS);
+    if (odd != 0.0 || nv_odd(p->s, INPUTS) || LOOK_NEURONS(p->form))
+        return 1;
+    return p->form ? LOOK_CONNECTIONS : LOOK_UNWATCHED;
 }
 
 NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
@@ -136,11 +139,11 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         const int kept = wait == 0;
         if (kept) {
             if (c->beside)
-                memcpy(weights, p->weights + c->changing[0], sizeof(double)*CHANGING);
+                memcpy(weights, p->weights + c->changing[0], sizeof(double)*c->changes);
             else
-                for (int64_t j = 0; j < CHANGING; j++)
+                for (int64_t j = 0; j < c->changes; j++)
                     weights[j] = p->weights[c->changing[j]];
-            weights += CHANGING;
+            weights += c->changes;
             wait = c->every;
             if (c->weighed)
                 memcpy(c->weighed, p->weights, sizeof(double)*CONNECTIONS);
@@ -169,7 +172,7 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         }
         made = i + 1;
         // what no step looked at is checked here; what no step changes, once
-        if (c->look && (odd != 0.0 || LOOK_NEURONS(form) || ((!WATCHED || form || !i) && LOOK_CONNECTIONS)))
+        if (c->look && (odd != 0.0 || LOOK_NEURONS(form) || (form || !i ? LOOK_CONNECTIONS : LOOK_UNWATCHED)))
             break;
     }
     if (fused)
@@ -234,9 +237,7 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     small = len(network.neurons) + len(network.connections) <= c_plan.written_out(plan, SMALL)
     bodies, room = list[str](), 0
     pointers = _pointer_lines(network, plan)
-    # loops over connections that store something in other operations are not watched
-    rules = all(one.kind == RULE and not one.use.definition.flows for one in network.projections)
-    watched = bool(network.projections) and rules and not small
+    watched = bool(network.projections) and not small
     # a network that is written out is in registers, and nothing is gained
     whole = StepCode(built, Code(emitter, tables, network.dt, {}), Form())
     fused = not small and whole.count + int(whole.fuses.sum()) > 0
@@ -255,11 +256,11 @@ def _write(network: Network, layout: SignalLayout) -> Written:
         named = {name: line for name, line in pointers.items() if f"*restrict {name}" not in parameters}
         bodies += [*function(code, head, named | tables.pointer_lines()), ""]
     counts = {"NEURONS": len(network.neurons), "CONNECTIONS": len(network.connections)}
-    counts |= {"INPUTS": network.vector_size, "CHANGING": len(network.changing)}
+    counts["INPUTS"] = network.vector_size
     defined = [f"#define {name} {value}" for name, value in counts.items()]
-    neurons, connections = _look(built)
-    defined += [f"#define LOOK_NEURONS(form) ({neurons})", f"#define LOOK_CONNECTIONS ({connections})"]
-    defined += [f"#define WATCHED {int(watched)}", f"#define FUSED {int(fused)}"]
+    looks = _look(built, watched)
+    defined += [f"#define LOOK_NEURONS(form) ({looks.neurons})", f"#define LOOK_CONNECTIONS ({looks.connections})"]
+    defined += [f"#define LOOK_UNWATCHED ({looks.unwatched})", f"#define FUSED {int(fused)}"]
     defined.append(f"#define BEFORE {int(whole.fuses.any())}")
     used = words_of(bodies)
     parts = [
@@ -329,11 +330,20 @@ def _shows_state(model: Definition) -> bool:
     return isinstance(shown, Name) and any(one.name == shown.name for one in model.state)
 
 
-def _look(built: Built) -> tuple[str, str]:
-    """The code of whether anything that neurons carry, and that connections carry, is not finite behind a step of a
-    ``form``."""
+class _Looks(NamedTuple):
+    """The code of whether anything is not finite behind a step of a ``form``: anything that neurons carry, and that
+    connections carry, and what of the latter a plain step has not watched itself."""
+
+    neurons: str
+    connections: str
+    unwatched: str
+
+
+def _look(built: Built, watched: bool) -> _Looks:
+    """What is looked at behind the steps of a network; ``watched``: whether plain ones watch what they can."""
     network = built.network
     tests = {"neuron": [f"nv_odd(p->activity, {len(network.neurons)})"], "connection": list[str]()}
+    unwatched = list[str]()
     if built.settles and all(_shows_state(one.model.definition) for one in network.populations):
         tests["neuron"] = [f"(form && {tests['neuron'][0]})"]  # where nothing is held it is what a cell is
     if network.projections and len(network.changing):  # what neither a rule nor an event changes is finite
@@ -343,9 +353,13 @@ def _look(built: Built) -> tuple[str, str]:
     for holder, use in network.uses:
         for one in use.definition.kept:
             if not (use.definition.fires and always_finite(one)):
-                tests[use.definition.kind.each].append(f"nv_odd(p->cells[{cell}], {len(holder.members)})")
+                test = f"nv_odd(p->cells[{cell}], {len(holder.members)})"
+                tests[use.definition.kind.each].append(test)
+                if use.definition.kind.each == "connection" and not is_watched(use.definition, one):
+                    unwatched.append(test)
             cell += 1
-    return " || ".join(tests["neuron"]), " || ".join(tests["connection"]) or "0"
+    found = (tests["neuron"], tests["connection"], unwatched if watched else tests["connection"])
+    return _Looks(*(" || ".join(some) or "0" for some in found))
 
 
 _POINTERS: Final = (
@@ -367,7 +381,8 @@ class _Course(ctypes.Structure):
     """``nv_course``: the steps of a call."""
 
     _fields_ = [
-        *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look", "beside", "columns")),
+        *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look")),
+        *((name, ctypes.c_int64) for name in ("beside", "changes", "columns")),
         *(
             (name, ctypes.c_void_p)
             for name in ("rows", "activity", "weights", "states", "formed", "weighed", "changing", "probed")
@@ -495,6 +510,7 @@ class CStepper:
             then=_GENERAL if state.k + 1 < self._plain_from else _PLAIN,
             look=look,
             beside=self._contiguous,
+            changes=weights.shape[1],
             rows=rows.ctypes.data,
             activity=activity.ctypes.data,
             weights=weights.ctypes.data,

@@ -42,6 +42,7 @@ from neurovis_spec.compiler.program import (
     Population,
     Port,
     Projection,
+    Quantity,
     ReadInputs,
     Receive,
     Send,
@@ -778,7 +779,10 @@ class StepCode:
                 stored, seen = self.sight.states(some), self.sight.known(some, read)
                 kept = partial(self.unless_held, projection.use, place)
                 new, _ = self.change(made, seen, stored, bounded=kept, begins=self.form.first)
-                self.store([(stored[name], value) for name, value in new.items()])
+                stores = [(stored[name], value) for name, value in new.items()]
+                if self.form.watched and projection.when:
+                    self.watch("odd", stores)
+                self.store(stores)
 
         if projection.when and not self.form.written_out:
             with self.rows(projection, self.sight) as place:
@@ -857,13 +861,17 @@ class StepCode:
         with self.where_carried_out(projection, places[0]):
             stores = [self.connection(projection, place) for place in places]
             for name, made in zip(sums, stores, strict=False):
-                for _, value in made:
-                    if not isinstance(value, float):  # x − x is 0, or NaN where x is not finite
-                        code.line(f"{name} += {value} - {value};")
+                self.watch(name, made)
             if not self.form.still:
                 self.store(leaving)
             for made in stores:
                 self.store(made)
+
+    def watch(self, name: str, made: Sequence[tuple[str, Value]]) -> None:
+        """To the sum of this name what is to be stored adds 0, or NaN where it is not finite."""
+        for _, value in made:
+            if not isinstance(value, float):  # x − x is 0, or NaN where x is not finite
+                self.code.line(f"{name} += {value} - {value};")
 
     def store_each(self, count: int, made: Callable[[Place], tuple[str, Value]]) -> None:
         """As many values, each in its cell."""
@@ -958,6 +966,14 @@ class _Own(NamedTuple):
 def _own(network: Network, port: str) -> _Own:
     neurons = network.neurons
     return _Own(bias_of(port), neurons.bias_at(port), neurons.input_at(port), network.noise_of(port))
+
+
+def is_watched(definition: Definition, state: Quantity) -> bool:
+    """Whether whatever changes a state of connections watches it, in a form that watches: all that rules do but to
+    integrate, and of synapses what waits for spikes."""
+    if state.derivative is not None:
+        return False
+    return definition.kind.lasting or (state.each_step is None and state.each_episode is None)
 
 
 def begins_otherwise(network: Network) -> bool:

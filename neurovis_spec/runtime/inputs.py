@@ -175,7 +175,7 @@ class InputReader:
         depends on how many are made together."""
         count = self._steps
         first -= first % count
-        if self.left:  # by functions that give the same bits whatever stands beside a number
+        if self.left or self.all_left:  # by functions that give the same bits whatever stands beside a number
             count = min(self._most, -(-(stop - first) // count) * count)
         steps = np.arange(first, first + count)
         rows, fed = np.zeros((count, self.network.vector_size)), self.fed

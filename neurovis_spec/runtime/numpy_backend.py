@@ -47,7 +47,7 @@ class NumpyStepper:
         steps = self._steps(state, vectors)
         for k in range(first, first + len(vectors)):
             kept = k % every == 0
-            if kept and changing is not None:
+            if kept and changing is not None and weights.shape[1]:
                 weights[row] = learned[changing]
             next(steps)
             if kept:

@@ -47,6 +47,8 @@ AS_IT_IS = Course()
 _BLOCK: Final = 0.1
 #: neurons and connections times steps of the first block, and its steps at most: how long one takes is not known yet
 _FIRST_SIZE, _FIRST_STEPS = 1 << 20, 1 << 12
+#: numbers of rows that are looked at for spikes alone, where that is more than a stretch
+_MOST_SEEN: Final = 1 << 21
 #: how many times as long as the one before a block is at most
 _GROWTH: Final = 16
 
@@ -245,9 +247,9 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
 
 
 def _given_together(stepper: Stepper, columns: Columns, network: Network, spiking: Spiking | None) -> bool:
-    """Whether a runner gives what is recorded: the activities of all neurons and all changing weights; states, spikes
-    that are one, and signals of synapses only where it is a probing one."""
-    plain = columns.neurons is None and len(columns.weights) == len(network.changing)
+    """Whether a runner gives what is recorded: the activities of all neurons and all changing weights, or none of
+    these; states, spikes that are one, and signals of synapses only where it is a probing one."""
+    plain = columns.neurons is None and len(columns.weights) in (0, len(network.changing))
     probed = len(columns.probe.names) > 0 or (spiking is not None and len(spiking.by_state) > 0)
     return plain and (isinstance(stepper, Probing) or not probed)
 
@@ -388,7 +390,7 @@ class _Together:
         for part in reader.parts(first, stop):
             begin = k
             while k < begin + len(part):
-                until = min(watch.next_stop(k, begin + len(part)), k + self._most(every))
+                until = min(watch.next_stop(k, begin + len(part)), k + self._most(every, room))
                 vectors = part[k - begin : until - begin]
                 made = self._run(state, vectors, room.part(slice(row, None)), every, not watch.warned)
                 row += _rows_between(k, k + made, every)
@@ -437,10 +439,13 @@ class _Together:
             self._seen[:] = [Rows(*(np.empty((count, array.shape[1])) for array in room))._replace(states=states)]
         return self._seen[0].part(slice(count))
 
-    def _most(self, every: int) -> int:
+    def _most(self, every: int, room: Rows) -> int:
         """The most steps to be seen at once: where spikes are looked for in rows that are not kept, as many as there
         is always room for."""
-        return sys.maxsize if self.spiking is None or self._kept(every) else STRETCH
+        if self.spiking is None or self._kept(every):
+            return sys.maxsize
+        width: int = sum(array.shape[1] for array in room) + len(self.spiking.by_state)
+        return max(STRETCH, _MOST_SEEN // max(1, width))
 
     def _made(self, state: State, vectors: FloatArray, room: Rows, every: int, look: bool) -> int:
         probe = self.probe
