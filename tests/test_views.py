@@ -7,7 +7,7 @@ import io
 import re
 from dataclasses import replace
 from functools import partial
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -32,7 +32,7 @@ from neurovis_spec.scene.panels import ViewError, panels_of
 from neurovis_spec.scene.series import chosen, full_name
 from neurovis_spec.scene.shots import Shots, shots_of
 from neurovis_spec.scene.shown import LeftOut
-from neurovis_spec.scene.texts import width
+from neurovis_spec.scene.texts import SUBSCRIPT_DROP, width
 from neurovis_spec.scene.themes import MOST_DISTINCT, contrast, distinct
 
 NS = "{http://www.w3.org/2000/svg}"
@@ -244,6 +244,18 @@ def test_names_at_the_ends_do_not_overlap_and_lie_within_the_page() -> None:
     for one, other in combinations(labels, 2):
         assert abs(one.point[1] - other.point[1]) >= 0.8 * one.size
     assert all(s.point[0] + width(s.text, s.size, s.weight, s.subscript) <= scene.width for s in labels)
+
+
+@pytest.mark.parametrize("count", [2, 15, 20, 30, 31])
+def test_names_of_rows_stand_clear_of_one_another(count: int) -> None:
+    """A subscript ends well above the capitals of the row beneath; of more rows the groups alone have names."""
+    spec = f"neurovis: 1\nname: rows\ntime: {{steps: 5}}\nneurons: {{N: {{count: {count}, bias: 1}}}}\n"
+    ground = groups(film("raster", network=nv.compile_text(spec)).scene, "view")["raster"]
+    rows = [s for s in ground.shapes if isinstance(s, Text) and s.subscript]
+    assert len(rows) == (count if count <= 30 else 0)
+    for row, beneath in pairwise(rows):
+        lowest = row.point[1] + SUBSCRIPT_DROP * row.size
+        assert beneath.point[1] - 0.73 * beneath.size - lowest > 0.35 * row.size
 
 
 def test_every_view_lowers_the_number_in_the_group_alone() -> None:

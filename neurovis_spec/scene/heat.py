@@ -22,10 +22,8 @@ from neurovis_spec.scene.strips import SMALL, TITLE, Span
 from neurovis_spec.scene.texts import Cut
 from neurovis_spec.scene.themes import blend, channels
 
-#: How high a row is at most, and a raster.
-ROW, HIGHEST = 13.0, 300.0
-#: A row lower than this has no name of its own; a group as high as this has one.
-_NAMED, _GROUPED = 8.5, 11.0
+#: How high a raster is at most; a group that is as high as this second one has a name.
+HIGHEST, _GROUPED = 300.0, 11.0
 _LABEL = 120.0
 #: Rows whose numbers are held at a time.
 _TOGETHER = 256
@@ -56,6 +54,20 @@ def bands_of(names: Sequence[str]) -> tuple[Band, ...]:
 
 
 @dataclass(frozen=True)
+class Rows:
+    """How high a row is at most (``high``); where it is lower than ``named`` it has no name of its own, which takes at
+    most this ``share`` of it."""
+
+    high: float
+    named: float
+    share: float
+
+
+#: Rows with plain names, and with names whose subscripts stand lower: these must not touch the row beneath.
+PLAIN, SUBSCRIPTED = Rows(13.0, 8.5, 0.9), Rows(15.0, 10.0, 0.75)
+
+
+@dataclass(frozen=True)
 class Heat:
     """``count`` rows: their colour values in −1…1, for any of them by number (steps, rows); which are ``spiking``, and
     the spikes of these, steps and numbers of rows; their names, with subscripts, and their groups."""
@@ -73,7 +85,11 @@ class Heat:
     @property
     def natural(self) -> float:
         """How high the cells are where nothing else is asked for."""
-        return min(HIGHEST, max(ROW * len(self.names), 2 * ROW))
+        return min(HIGHEST, self._rows.high * max(len(self.names), 2))
+
+    @property
+    def _rows(self) -> Rows:
+        return SUBSCRIPTED if any(subscript for _, subscript in self.names) else PLAIN
 
     @property
     def left(self) -> float:
@@ -88,7 +104,7 @@ class Heat:
         return self.groups if plot >= _GROUPED * len(self.groups) else self.outer
 
     def _named(self, plot: float) -> bool:
-        return plot >= _NAMED * len(self.names)
+        return plot >= self._rows.named * len(self.names)
 
     def height(self, plot: float) -> float:
         """How high it is with cells of this height, without the axis of the time."""
@@ -162,7 +178,7 @@ class Heat:
             y = top + band.start * each
             shapes.append(Polyline(((span.left - 4, y), (span.right, y)), theme.background, 1.2))
         if self._named(plot):
-            size = min(SMALL, 0.9 * each)
+            size = min(SMALL, self._rows.share * each)
             cut = Cut(base for base, _ in self.names)
             for row, words in enumerate(self.names):
                 parts = cut.parts(*words, size, _LABEL, 400)
