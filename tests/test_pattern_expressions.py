@@ -168,3 +168,34 @@ connections:
     assert len(set(made.delays.whole().tolist())) > 1
     once = nv.compile_text(spec.replace("{total: {count: 4, multapses: true}}", "all_to_all")).network.connections
     assert weights[0] == once.weights.whole()[0]
+
+
+def where(condition: str, neurons: str = "A: {count: 6}", more: str = "") -> list[tuple[int, int]]:
+    spec = f"neurovis: 1\nname: x\nneurons: {{{neurons}}}\nconnections: {{A -> A: {{where: {condition}{more}}}}}"
+    made = nv.compile_text(spec, seed=1).network.connections
+    return list(zip(made.sources.tolist(), made.targets.tolist(), strict=True))
+
+
+def test_where_makes_exactly_the_pairs_of_which_it_holds() -> None:
+    assert where("floor(j/3) == i", more=", self: true") == [(0, 0), (0, 1), (0, 2), (1, 3), (1, 4), (1, 5)]
+    assert where("floor(j/3) == i") == [(0, 1), (0, 2), (1, 3), (1, 4), (1, 5)]
+    assert where("distance == 1", PLACED) == pairs("{band: {width: 1}}")
+    assert where("i == j - 1, pattern: all_to_all") == pairs("chain")
+
+
+@pytest.mark.parametrize("pattern", ["ring", "{band: {width: 2}}", "{random: {probability: 0.5}}", "all_to_all"])
+def test_where_beside_a_pattern_leaves_out_what_it_does_not_hold_of(pattern: str) -> None:
+    assert where(f"i < j, pattern: {pattern}") == [(i, j) for i, j in pairs(pattern) if i < j]
+
+
+def test_of_a_symmetric_entry_where_may_hold_either_way() -> None:
+    both = where("i == 0 or j == 0", more=", symmetric: true")
+    assert both == where("i == 0", more=", symmetric: true")
+    assert both == [pair for j in range(1, 6) for pair in ((0, j), (j, 0))]
+
+
+def test_where_makes_no_more_than_there_is_room_for() -> None:
+    spec = "neurovis: 1\nname: x\nneurons: {A: {count: 3000}}\nconnections: {A -> A: {where: i + j < 3}}"
+    assert len(nv.compile_text(spec, limit=10).network.connections) == 4
+    with pytest.raises(nv.SpecError, match="the limit is 3"):
+        nv.compile_text(spec, limit=3)

@@ -31,6 +31,7 @@ from neurovis_spec.language.grammar import (
     SETTABLE,
     TEXT,
     TWO,
+    WHICH,
     AsTable,
     Either,
     ListOf,
@@ -368,6 +369,10 @@ class ConnectionModel(Model):
     pattern: Annotated[PatternField | None, NotWith(("matrix", "edges", _CENTRE), _WHICH)] = Field(
         None,
         description="Which pairs are connected: all_to_all, one_to_one, chain, ring, {random: {probability: p}}, ….",
+    )
+    where: Annotated[FormulaField | None, WHICH, NotWith(("matrix", "edges", _CENTRE), _WHICH)] = Field(
+        None,
+        description="Which pairs, of a pattern or of all, there are: an expression of i, j, distance, …, true or not.",
     )
     self: Annotated[
         BoolField | None,

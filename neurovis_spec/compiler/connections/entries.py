@@ -24,7 +24,7 @@ from neurovis_spec.compiler.connections.edges import EdgeColumns, EdgeReader, En
 from neurovis_spec.compiler.connections.ends import Ends, counted
 from neurovis_spec.compiler.connections.in_use import InUse, Joined, in_use
 from neurovis_spec.compiler.connections.pair_formulas import At, PairFormulas
-from neurovis_spec.compiler.connections.patterns import all_to_all, drawn_alone, empty_reason, pairs_of
+from neurovis_spec.compiler.connections.patterns import all_to_all, drawn_alone, empty_reason, pairs_of, pairs_where
 from neurovis_spec.compiler.connections.plasticity import Learning, rules_of
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
 from neurovis_spec.compiler.connections.signals import ConnectionEnds, Place
@@ -45,7 +45,9 @@ from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.matrices import Grid, draws_any, grid_of
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.tree import draws, names
+from neurovis_spec.language.grammar import WHICH
 from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.tables import EdgeFile, FileReference, columns_of_edges, edge_column
@@ -54,7 +56,7 @@ from neurovis_spec.language.values import Delay, MatrixRows
 from neurovis_spec.language.yaml.source import Mapping, Scalar
 
 #: Keys of a body that say which connections there are.
-_SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self"})
+_SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self", "where"})
 _PAIR = formula_at(ConnectionModel, "weight")
 _SETTING = formula_at(ConnectionModel, "synapse", "SYNAPSE", "SETTING")
 #: Keys that a symmetric entry cannot have, why, and what to do.
@@ -352,9 +354,13 @@ class EntryBuilder:
         return self.key.span if entry is None else entry.key.span
 
     def _report_empty(self) -> None:
-        """Say that there are no connections: an error, but for those that are drawn or counted, as validity depends on
-        no seed and no parameter."""
-        pattern, findings = self.body.pattern, self.constants.findings
+        """Say that there are no connections: an error, but for those that are drawn, counted or chosen by a condition,
+        as validity depends on no seed and no parameter."""
+        pattern, where, findings = self.body.pattern, self.body.where, self.constants.findings
+        if where is not None:
+            hint = "i and j count from 0; a neuron is connected to itself with self: true alone"
+            findings.warning("nothing-drawn", where.span, "of no pair 'where' holds", hint)
+            return
         reason = None if pattern is None else empty_reason(pattern, self.formulas)
         if reason is None:
             findings.error("no-connection", self.key.span, "this entry makes no connection at all")
@@ -407,6 +413,7 @@ class EntryBuilder:
             grid = UNKNOWN if body.matrix is None else self._grid(body.matrix, "weight")
         edges = UNKNOWN if body.edges is None else self._edges()
         pattern = UNKNOWN if body.pattern is None else self._pattern()
+        where = UNKNOWN if body.where is None or body.pattern is not None else self._where(body.where)
         if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._is_sound(*_SHAPING):
             return UNKNOWN
         if body.edges is not None:
@@ -421,7 +428,7 @@ class EntryBuilder:
             if centre is None or centre is UNKNOWN:
                 return UNKNOWN
             return _cells_of(centre.present, centre.values)._replace(weights=None)
-        return pattern if body.pattern is not None else self._all_pairs()
+        return pattern if body.pattern is not None else self._all_pairs() if body.where is None else where
 
     def _ends(self) -> Ends | Unknown:
         if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._is_sound("self"):
@@ -434,11 +441,33 @@ class EntryBuilder:
     def _pattern(self) -> _Shape | Unknown:
         """The pairs of a pattern. Some patterns connect by position, so ends with an invalid one are not known."""
         assert self.body.pattern is not None
+        everything = self.body.pattern.name.value == "all_to_all" and not self.body.pattern.settings.entries
+        if self.body.where is not None and everything:
+            return self._where(self.body.where)
         ends = UNKNOWN if self.formulas.misplaced else self._ends()
         pairs = pairs_of(self.body.pattern, ends, self.formulas, self._stream, self._may_fit)
         if ends is not UNKNOWN and self.body.pattern.name.value == "nearest":  # what places neurons is structural then
             self.context.census.go_by_position(np.concatenate((ends.sources, ends.targets)))
-        return UNKNOWN if pairs is UNKNOWN else _shape_of(narrow(pairs[0]), narrow(pairs[1]))
+        shape = UNKNOWN if pairs is UNKNOWN else _shape_of(narrow(pairs[0]), narrow(pairs[1]))
+        return shape if self.body.where is None else self._some_where(shape, self.body.where)
+
+    def _where(self, condition: Formula) -> _Shape | Unknown:
+        """Of all pairs those of which a condition holds."""
+        ends, rows = self._ends(), self.formulas.rows(condition, WHICH)
+        pairs = UNKNOWN if ends is UNKNOWN or rows is UNKNOWN else pairs_where(ends, rows, self._may_fit)
+        return UNKNOWN if pairs is UNKNOWN else _Shape(*pairs)
+
+    def _some_where(self, shape: _Shape | Unknown, condition: Formula) -> _Shape | Unknown:
+        """Of the pairs of a pattern those of which a condition holds."""
+        pattern = PATTERNS.get(self.body.pattern.name.value) if self.body.pattern is not None else None
+        if pattern is not None and pattern.counts:
+            message = f"'where' beside '{pattern.name}', which counts the connections that it makes"
+            hint = "leave 'where' out, or take a probability: random: {probability: p if … else 0}"
+            self.constants.findings.error("conflicting-keys", condition.span, message, hint)
+            shape = UNKNOWN
+        at = UNKNOWN if shape is UNKNOWN else At(shape.i, shape.j)
+        holds = self.formulas.structural(condition, WHICH, at, self._stream("edges"))
+        return UNKNOWN if holds is UNKNOWN or shape is UNKNOWN else shape.some(np.flatnonzero(holds))
 
     def _all_pairs(self) -> _Shape | Unknown:
         """All pairs, where nothing says which."""

@@ -88,6 +88,16 @@ class PairFormulas:
         self.constants.follow(parts)
         return UNKNOWN if value is UNKNOWN else np.broadcast_to(np.asarray(value, dtype=np.float64), at.shape)
 
+    def structural(self, formula: Formula, role: Role, at: At | Unknown, stream: Stream) -> FloatArray | Unknown:
+        """The same of what the structure depends on."""
+        with self.constants.following() as parts:
+            values = self.values(formula, role, at, stream)
+        self.constants.depend_on(parts)
+        tree = self.constants.tree(formula, role) if values is not UNKNOWN else UNKNOWN
+        if tree is not UNKNOWN:
+            self.go_by(names(tree))
+        return values
+
     def rows(self, formula: Formula, role: Role) -> Rows | Unknown:
         """A formula over all pairs, a few rows at a time, on which the structure depends; of one that is the same for
         all of them a number would do."""

@@ -18,7 +18,7 @@ from neurovis_spec.compiler.connections.pair_formulas import At, PairFormulas, R
 from neurovis_spec.compiler.values.constants import NEAR_INTEGER, Constants
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.expressions.tree import draws, names
+from neurovis_spec.language.expressions.tree import draws
 from neurovis_spec.language.grammar import OF_ENTRY, OF_SOURCE, OF_TARGET, WHICH
 from neurovis_spec.language.keys import settings_of
 from neurovis_spec.language.located import Formula, formula_of
@@ -127,13 +127,10 @@ class SettingsReader:
         if not self.formulas.differs(formula, role):
             count = self._constants.integer(formula, "a count", 0, extra=self.formulas.sizes(role))
             return UNKNOWN if count is UNKNOWN or which is UNKNOWN else np.full(which.shape, count, dtype=np.int64)
-        with self._constants.following() as parts:
-            values = self.formulas.values(formula, role, which, self.stream("count"))
-        self._constants.depend_on(parts)
-        tree = self._constants.tree(formula, role)
+        values = self.formulas.structural(formula, role, which, self.stream("count"))
+        tree = self._constants.tree(formula, role) if values is not UNKNOWN else UNKNOWN
         if values is UNKNOWN or tree is UNKNOWN:
             return UNKNOWN
-        self.formulas.go_by(names(tree))
         whole = np.rint(values)
         far = np.zeros(values.shape, dtype=np.bool_) if draws(tree) else np.abs(values - whole) > NEAR_INTEGER
         wrong = np.flatnonzero(far | (whole < 0) | (whole > _MOST))
