@@ -51,7 +51,7 @@ class KeepKeywords(TypedDict, total=False):
     every: int
     states: str | Sequence[str]
     neurons: str | Sequence[str]
-    weights: Literal["plastic", "none"]
+    weights: str | Sequence[str]
     signals: Literal["all", "none"]
 
 
@@ -177,13 +177,16 @@ def keep_of(given: KeepKeywords, last: bool = False) -> Keep:
     """What of a step is recorded. Raises ValueError."""
     from neurovis_spec.runtime.columns import Keep
 
-    if given["weights"] not in ("plastic", "none"):
-        raise ValueError(f"weights are 'plastic' or 'none', not {given['weights']!r}")
+    connections = arguments.texts("weights", given["weights"])
+    for one in ("plastic", "none"):
+        if one in connections and len(connections) > 1:
+            raise ValueError(f"weights are 'plastic', 'none' or references to connections, not '{one}' beside others")
     if given["signals"] not in ("all", "none"):
         raise ValueError(f"signals are 'all' or 'none', not {given['signals']!r}")
     neurons, states = arguments.texts("neurons", given["neurons"]), arguments.texts("states", given["states"])
-    weights, sent = given["weights"] == "plastic", given["signals"] == "all"
-    return Keep(neurons, weights, states, last=arguments.truth("last", last), sent=sent)
+    weights, some = connections != ("none",), () if connections in (("plastic",), ("none",)) else connections
+    sent = given["signals"] == "all"
+    return Keep(neurons, weights, some, states, last=arguments.truth("last", last), sent=sent)
 
 
 def course_of(

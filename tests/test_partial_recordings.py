@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -99,7 +98,9 @@ def disjoint(whole: Recording, references: Sequence[str]) -> list[str]:
     return kept
 
 
-def agree(back: Recording, whole: Recording, neurons: set[str], states: set[str], weights: bool, every: int) -> None:
+def agree(
+    back: Recording, whole: Recording, neurons: set[str], states: set[str], weights: set[str], every: int
+) -> None:
     """What was recorded is there to the bit, what was not is not."""
     for name in whole.neurons:
         if name in neurons:
@@ -114,7 +115,7 @@ def agree(back: Recording, whole: Recording, neurons: set[str], states: set[str]
             assert name not in back
     for index in whole.plastic.tolist():
         name = whole.connection_names[index]
-        if weights:
+        if name in weights:
             assert np.array_equal(back.weight(name), whole.weight(name)[::every])
         else:
             with pytest.raises(KeyError):
@@ -130,7 +131,7 @@ def agree(back: Recording, whole: Recording, neurons: set[str], states: set[str]
 @given(
     data=st.data(),
     name=st.sampled_from(sorted(SPECS)),
-    weights=st.sampled_from(["plastic", "none"]),
+    weights=st.sampled_from([["plastic"], ["none"], [0], [0, 1], [2]]),
     every=st.sampled_from([1, 1, 3]),
     suffix=st.sampled_from(["npz", "csv", "csv", "mcap"]),
     streamed=st.booleans(),
@@ -140,7 +141,7 @@ def test_what_run_writes_load_reads(
     wholes: dict[str, Recording],
     data: st.DataObject,
     name: str,
-    weights: str,
+    weights: list[str | int],
     every: int,
     suffix: str,
     streamed: bool,
@@ -149,9 +150,12 @@ def test_what_run_writes_load_reads(
     neurons = disjoint(whole, data.draw(some(SPECS[name][1])))
     states = data.draw(some(SPECS[name][2]))
     held = {one for reference in neurons for one in whole.names_of(reference)} or set(whole.neurons)
-    kept: Literal["plastic", "none"] = "none" if weights == "none" else "plastic"
+    changing = [whole.connection_names[index] for index in whole.plastic.tolist()]
+    kept = [changing[one % len(changing)] if isinstance(one, int) else one for one in weights]
+    named = {name for name in changing if any(name == one or name.startswith(f"{one} (") for one in kept)}
+    some_weights = {"plastic": set(changing), "none": set[str]()}.get(kept[0], named)  # of the same ends all
     made = network.run(13, every=every, neurons=neurons, states=states, weights=kept)
-    partial = len(held) < len(whole.neurons)
+    partial = len(held) < len(whole.neurons) or 0 < len(some_weights) < len(changing)
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"x.{suffix}"
 
@@ -168,9 +172,9 @@ def test_what_run_writes_load_reads(
             return
         write()
         back = nv.load(path)
-    agree(back, whole, held, set(made.state_names), kept == "plastic", every)
+    agree(back, whole, held, set(made.state_names), some_weights, every)
     fit = fitted(back, network.network)
-    agree(fit, whole, held, set(made.state_names), kept == "plastic", every)
+    agree(fit, whole, held, set(made.state_names), some_weights, every)
     assert fit.neurons == whole.neurons
     assert fit.missing == made.missing
     if fit.missing is None:

@@ -52,7 +52,7 @@ class Keeping:
     only: Literal["weights"] | None
     states: tuple[str, ...]
     neurons: tuple[str, ...]
-    weights: Literal["plastic", "none"]
+    weights: tuple[str, ...]
     signals: Literal["all", "none"]
     until: str | None
     checkpoint: Path | None
@@ -67,7 +67,7 @@ class Keeping:
             "until": None if self.until is None else network.until(self.until),
             "states": self.states,
             "neurons": self.neurons,
-            "weights": self.weights,
+            "weights": self.weights or "plastic",
             "signals": self.signals,
             "checkpoint": self.checkpoint,
         }
@@ -97,9 +97,10 @@ keeping_options: Final = as_one(
     ),
     click.option(
         "--weights",
-        type=click.Choice(["plastic", "none"]),
-        default="plastic",
-        help="Record the weights that can change, the default, or none.",
+        metavar="REF",
+        multiple=True,
+        help="Record the weights that can change of these connections only, such as 'K -> O', or 'none'; default: "
+        "'plastic', all. Repeatable.",
     ),
     click.option(
         "--signals",

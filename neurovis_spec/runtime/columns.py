@@ -22,7 +22,7 @@ from neurovis_spec.compiler.network import Located, Network
 from neurovis_spec.compiler.program import SPIKE, SYNAPSE, Definition, Each, Owner
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.references import find_neurons, find_states
+from neurovis_spec.runtime.references import find_connections, find_neurons, find_states
 from neurovis_spec.runtime.rows import After, Rows, Widths
 from neurovis_spec.runtime.spikes import Fired
 from neurovis_spec.runtime.state import State
@@ -41,8 +41,9 @@ class Keep:
 
     #: references to neurons; all where there are none
     neurons: tuple[str, ...] = ()
-    #: whether the changing weights are
+    #: whether the changing weights are, and if so of which references to connections; of all where there are none
     weights: bool = True
+    connections: tuple[str, ...] = ()
     #: references to states, besides those that the outputs of the spec name and its pictures show
     states: tuple[str, ...] = ()
     #: the spec itself as one text, where a format holds it
@@ -203,7 +204,8 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
     """What is kept of a network, and of the body that it has in a run; states that its pictures show are, as those that
     its outputs name, and where all is there that a picture needs, those that connections send (Eq. 3). Raises KeyError
     with the nearest names."""
-    names = names_of(network) if keep.neurons or keep.states else None
+    names = names_of(network) if keep.neurons or keep.states or keep.connections else None
+    weights = _weights(network, keep, names)
     states: dict[tuple[str, Each, int], None] = {}
     outputs: dict[str, tuple[tuple[int, ...], bool]] = {}
     for output in network.outputs:
@@ -213,7 +215,7 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
             outputs[output.name] = tuple(list(states).index(one) for one in of_output), output.scalar
     shown = (StateOf.of("neuron", one.state, one.indices) for one in network.render.show)
     states.update(dict.fromkeys(singles(shown)))
-    if keep.sent and not keep.neurons and (keep.weights or not len(network.changing)):
+    if keep.sent and not keep.neurons and len(weights) == len(network.changing):
         of_connections = keep.weights  # which are as many as weights
         states.update(dict.fromkeys(singles(one for one in network.sent if of_connections or len(one.neurons))))
     for reference in keep.states:
@@ -221,7 +223,7 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
     neurons = _neurons(keep.neurons, names, len(network.neurons))
     return Columns(
         neurons=neurons,
-        weights=network.changing if keep.weights else network.changing[:0],
+        weights=weights,
         probe=_probe(network, list(states)),
         outputs=outputs,
         spiking=spiking_of(network, neurons),
@@ -229,6 +231,16 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
         sensors=None if body is None else body.sensor_names,
         skeleton=None if body is None else body.skeleton,
     )
+
+
+def _weights(network: Network, keep: Keep, names: Names | None) -> IntArray:
+    """The connections whose weights are kept, ascending."""
+    if not keep.weights:
+        return network.changing[:0]
+    if not keep.connections or names is None:
+        return network.changing
+    wanted = [find_connections(network, reference, names) for reference in keep.connections]
+    return np.intersect1d(network.changing, np.concatenate(wanted))
 
 
 def _neurons(references: Sequence[str], names: Names | None, count: int) -> IntArray | None:
@@ -341,6 +353,7 @@ def recording_of(
         state_names=columns.probe.names,
         state_views=columns.outputs,
         recorded=columns.neurons,
+        recorded_weights=None if len(columns.weights) in (0, len(network.changing)) else columns.weights,
         spec=columns.spec,
         namespace=network.ros.namespace,
         sensors=None if columns.sensors is None else rows.sensors,

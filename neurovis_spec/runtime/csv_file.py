@@ -99,8 +99,7 @@ class _Table:
     def __init__(self, file: BinaryIO, frame: Recording) -> None:
         self._text = io.TextIOWrapper(file, encoding="utf-8", newline="")
         self._writer, self._dt = csv.writer(self._text, lineterminator="\n"), frame.dt
-        plastic = frame.plastic.tolist() if frame.weights.shape[1] else []
-        names = [frame.connection_names[index] for index in plastic]
+        names = [frame.connection_names[index] for index in frame.weight_columns.tolist()]
         sensors = [_SENSOR + name for name in frame.sensor_names]
         states = [("" if frame.recorded is None else _STATE) + name for name in frame.state_names]
         self._writer.writerow(["step", "t", *frame.columns, *names, *states, *sensors])

@@ -58,16 +58,20 @@ def of_table(recording: Recording, network: Network) -> Recording | None:
     changing = tuple(network.connection_names[index] for index in network.changing.tolist())
     table = not recording.hash and len(recording.plastic) == len(recording.sources)
     known = all(name in network.neuron_index for name in recording.neurons)
-    if not (table and known and recording.connection_names in ((), changing)):
+    if not (table and known and set(recording.connection_names) <= set(changing)):
         return None
     indices = np.array([network.neuron_index[name] for name in recording.columns], dtype=np.int64)
     order = np.argsort(indices)
-    rows = recording.rows._replace(activity=recording.activity[:, order])
-    weights = len(recording.plastic) == len(changing)
-    after = After(recording.weights_after if weights else np.full(len(changing), np.nan), recording.reached)
-    held = columns_of(network, Keep(weights=weights))
+    named = np.array([network.connection_index[name] for name in recording.connection_names], dtype=np.int64)
+    weights = np.argsort(named)
+    rows = recording.rows._replace(activity=recording.activity[:, order], weights=recording.weights[:, weights])
+    weights_after = np.full(len(changing), np.nan)
+    weights_after[np.searchsorted(network.changing, named)] = recording.weights_after
+    after = After(weights_after, recording.reached)
+    held = columns_of(network, Keep(weights=len(named) > 0))
     columns = replace(
         held,
+        weights=named[weights],
         neurons=None if len(indices) == len(network.neurons) else indices[order],
         probe=Probe(recording.state_names, ()),
         outputs=dict(_outputs(held, recording.state_names)),

@@ -87,6 +87,8 @@ class _McapRows:
     def __init__(self, file: FileIO, frame: Recording, part: Part | None = None, steps: Steps | None = None) -> None:
         if frame.recorded is not None:
             raise RecordingError("a .mcap holds the activities of all neurons: record a part as .npz or .csv")
+        if frame.recorded_weights is not None:
+            raise RecordingError("a .mcap holds all changing weights or none: record a part as .npz or .csv")
         self._file, self._dt, self._part, self._steps = file, frame.dt, part, steps
         self._rows, self._synced, self._after = 0, monotonic(), ""
         base = f"{frame.namespace.rstrip('/')}/{frame.network or 'network'}"

@@ -62,6 +62,7 @@ OPTIONAL: Mapping[str, tuple[str, int]] = {
     "states": ("fiu", 2),
     "state_names": ("U", 1),
     "recorded": ("iu", 1),
+    "recorded_weights": ("iu", 1),
     "sensors": ("fiu", 2),
     "sensor_names": ("U", 1),
     "pose": ("fiu", 2),
@@ -268,6 +269,8 @@ def _fixed_arrays(recording: Recording) -> dict[str, Array]:
         more["state_names"] = np.array(recording.state_names, dtype=np.str_)
     if recording.recorded is not None:
         more["recorded"] = recording.recorded
+    if recording.recorded_weights is not None:
+        more["recorded_weights"] = recording.recorded_weights
     if recording.sensors is not None:
         more["sensor_names"] = np.array(recording.sensor_names, dtype=np.str_)
     if recording.skeleton is not None:
@@ -347,7 +350,7 @@ def _check_shapes(arrays: Mapping[str, Array], n: int, recorded: IntArray | None
     shapes = {
         "activity": (rows, n if recorded is None else len(recorded)),
         "neurons": (n,),
-        "weights": (rows, p if arrays["weights"].shape[1] else 0),
+        "weights": (rows, len(arrays.get("recorded_weights", arrays["plastic"])) if arrays["weights"].shape[1] else 0),
         "states": (rows, len(arrays.get("state_names", ()))),
         "weights_static": (m - p,),
         "targets": (m,),
@@ -386,6 +389,7 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         raise RecordingError(f"'dt' is {dt}")
     about = _about(arrays)
     step = _integers(arrays, "step", 0, 2**62, ascending=True)
+    plastic = _integers(arrays, "plastic", 0, m, ascending=True)
     weights = arrays["weights"].astype(np.float64)
     after = _after(arrays, about, after_rows(step, weights, p), n, m)
     recording = Recording(
@@ -393,7 +397,7 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         neurons=neurons,
         weights=weights,
         weights_static=arrays["weights_static"].astype(np.float64),
-        plastic=_integers(arrays, "plastic", 0, m, ascending=True),
+        plastic=plastic,
         sources=_integers(arrays, "sources", 0, n),
         targets=_integers(arrays, "targets", 0, n),
         delays=_integers(arrays, "delays", 0, 2**31),
@@ -413,6 +417,7 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         state_names=state_names,
         state_views=_views(about, "state_views", len(state_names)),
         recorded=recorded,
+        recorded_weights=_recorded_weights(arrays, plastic, m),
         sensors=arrays["sensors"].astype(np.float64) if "sensors" in arrays else None,
         sensor_names=tuple(str(name) for name in arrays["sensor_names"].tolist()) if "sensors" in arrays else (),
         pose=None if skeleton is None else arrays["pose"].astype(np.float64),
@@ -420,6 +425,16 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         backend=str(about.get("backend", "")),
     )
     return _with_spikes(recording, arrays)
+
+
+def _recorded_weights(arrays: Mapping[str, Array], plastic: IntArray, m: int) -> IntArray | None:
+    """The connections whose weights alone are there; None where all are, or none. Raises RecordingError."""
+    if "recorded_weights" not in arrays:
+        return None
+    found = _integers(arrays, "recorded_weights", 0, m, ascending=True)
+    if not np.isin(found, plastic).all():
+        raise RecordingError("'recorded_weights' names connections whose weights never change")
+    return found
 
 
 def _with_spikes(recording: Recording, arrays: Mapping[str, Array]) -> Recording:

@@ -87,7 +87,8 @@ class Recording:
     Where the network spikes, ``spikes("E")`` gives the spikes of a reference, also of steps that have no row.
 
     A partial recording holds the activities of some neurons alone, those that ``recorded`` lists (None: of all), so
-    that ``activity`` has fewer columns, or no weights: then ``weights`` has no columns.
+    that ``activity`` has fewer columns, or no weights: then ``weights`` has no columns, or the weights of some changing
+    connections alone, those that ``recorded_weights`` lists (None: of all, or of none).
     """
 
     activity: FloatArray
@@ -118,6 +119,7 @@ class Recording:
     #: outputs that name states: columns of ``states``, and whether a single one is meant
     state_views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
     recorded: IntArray | None = None
+    recorded_weights: IntArray | None = None
     #: the spec as one text and the namespace of its topics, for formats that hold them
     spec: str = ""
     namespace: str = "/neurovis"
@@ -140,11 +142,9 @@ class Recording:
         object.__setattr__(self, "state_names", tuple(self.state_names))
         shape = len(self.step), len(self.state_names)
         object.__setattr__(self, "states", np.asarray(self.states, dtype=np.float64).reshape(shape))
-        if self.recorded is not None:
-            object.__setattr__(self, "recorded", np.asarray(self.recorded, dtype=np.int64))
-            frozen(self.recorded)
-        if self.spiking is not None:
-            object.__setattr__(self, "spiking", frozen(np.asarray(self.spiking, dtype=np.int64)))
+        for name in ("recorded", "recorded_weights", "spiking"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(np.asarray(getattr(self, name), dtype=np.int64)))
         for name in ("spike_steps", "spike_neurons"):
             object.__setattr__(self, name, frozen(np.asarray(getattr(self, name), dtype=np.int64)))
         object.__setattr__(self, "spike_range", tuple(self.spike_range))
@@ -315,7 +315,7 @@ class Recording:
             names = [name for index, name in enumerate(self.neurons) if index not in there]
             lacks.append(f"the activities of {listed(names)}")
         if self.weights.shape[1] < len(self.plastic):
-            lacks.append("the changing weights")
+            lacks.append("the changing weights" if self.recorded_weights is None else "other changing weights")
         return " and ".join(lacks) or None
 
     def check_whole(self, what: str) -> None:
@@ -378,12 +378,13 @@ class Recording:
         return found.neurons
 
     def _weight_of(self, index: int, name: str) -> FloatArray:
-        column = int(np.searchsorted(self.plastic, index))  # so many of those that change come before it
-        if column < len(self.plastic) and self.plastic[column] == index:
-            if not self.weights.shape[1]:
-                raise UnknownNameError(f"the weight '{name}' was not recorded: the recording is partial")
-            return self.weights[:, column]
-        return np.broadcast_to(self.weights_static[index - column], (len(self),))
+        before = int(np.searchsorted(self.plastic, index))  # so many of those that change come before it
+        if before == len(self.plastic) or self.plastic[before] != index:
+            return np.broadcast_to(self.weights_static[index - before], (len(self),))
+        column = int(np.searchsorted(self.weight_columns, index))
+        if column == len(self.weight_columns) or self.weight_columns[column] != index:
+            raise UnknownNameError(f"the weight '{name}' was not recorded: the recording is partial")
+        return self.weights[:, column]
 
     def all_weights(self, row: int) -> FloatArray:
         """w[t] of all connections (m,) in a row."""
@@ -437,7 +438,7 @@ class Recording:
         ``target``, ``delay``), ``state_name`` and ``sensor_name``. Weights that stay are in ``weight_static`` (static).
         Raises ImportError without the extra ``xarray``."""
         xarray = _extra("xarray")
-        plastic, static = self._recorded_plastic, self._static
+        plastic, static = self.weight_columns, self._static
         result: xr.Dataset = xarray.Dataset(
             {
                 "activity": (("step", "neuron"), self.activity),
@@ -512,7 +513,7 @@ class Recording:
     @property
     def _traced(self) -> tuple[Traced, ...]:
         """What has a line over the steps, kind by kind; a pose is drawn, not traced."""
-        weights = [self.connection_names[index] for index in self._recorded_plastic.tolist()]
+        weights = [self.connection_names[index] for index in self.weight_columns.tolist()]
         return (
             Traced("activity", self.columns, self.activity),
             Traced("weight", weights, self.weights),
@@ -521,8 +522,10 @@ class Recording:
         )
 
     @property
-    def _recorded_plastic(self) -> IntArray:
-        """The indices of the connections whose weights it holds."""
+    def weight_columns(self) -> IntArray:
+        """The indices of the changing connections whose weights it holds, one a column of ``weights``."""
+        if self.recorded_weights is not None:
+            return self.recorded_weights
         return self.plastic if self.weights.shape[1] else self.plastic[:0]
 
 
