@@ -18,8 +18,9 @@ from neurovis_spec.cli.tables import number, spread, table
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE
 from neurovis_spec.compiler.program import (
+    FEED,
+    JOINING,
     RULE,
-    SYNAPSE,
     Advance,
     Definition,
     Diffuse,
@@ -245,7 +246,8 @@ def _rows(network: Network, operation: Operation) -> Iterator[tuple[str, str, st
             for one in connected:
                 yield "integrate", _connected(network, one), _flows(network.projections[one].use.definition, how)
         case Receive(projection=one, phases=phases):
-            if once := _changed(replace(network.projections[one].during(phases).use.definition, gives=())):
+            definition = network.projections[one].during(phases).use.definition
+            if once := _changed(definition if definition.kind == FEED else replace(definition, gives=())):
                 yield "on_pre" if "on_pre" in phases else "receive", _connected(network, one), once
         case SendAhead(population=one, names=names):
             yield "send ahead", _members(network, one), ", ".join(names)
@@ -277,7 +279,7 @@ def _spikes(network: Network) -> Iterator[tuple[str, str]]:
                 for entry in np.unique(network.connections.entry[port.incoming[some]]).tolist():
                     yield names[entry], how
     for one in network.projections:
-        if one.kind == SYNAPSE and one.use.definition.has("on_pre"):
+        if one.kind in JOINING and one.use.definition.has("on_pre"):
             for entry in np.unique(network.connections.entry[one.members]).tolist():
                 yield names[entry], _BEHIND if one.at_once else _BEFORE
 

@@ -22,6 +22,7 @@ from neurovis_spec.compiler.network import Connections, Group, Input, Network, N
 from neurovis_spec.compiler.program import (
     ACTIVATION,
     DRIVE,
+    FEED,
     MODEL,
     RULE,
     SYNAPSE,
@@ -146,7 +147,9 @@ def _projection(one: Projection, moved: IntArray, names: npt.NDArray[np.str_]) -
     rule, parameters = _definition(one.rule.definition), one.rule.parameters
     fields = {"rule": rule, "members": one.members, "parameters": parameters, "signals": signals}
     states = {name: names[indices].tolist() for name, indices in one.signals.items() if (names[indices] != "").any()}
-    further = {"place": one.place, "states": states}
+    further: dict[str, object] = {"place": one.place, "states": states}
+    if one.slots is not None:
+        further |= {"feeds": (one.feeds, one.slots)}
     return Record("Plasticity", fields | {name: value for name, value in further.items() if value})
 
 
@@ -163,6 +166,8 @@ def _definition(made: Definition) -> Record:
         return Record("Rule", {**named, "signals": sorted(made.signals), **inner, **steps, **_beyond(made)})
     if made.kind == SYNAPSE:
         return Record("Synapse", {**named, **inner, "signal": made.given.each_step, **_beyond(made)})
+    if made.kind == FEED:
+        return Record("Feed", {**named, "let": made.let, **_beyond(made)})
     raise TypeError(f"no schema says what of a {made.kind.name} is content")
 
 
@@ -178,7 +183,7 @@ def _beyond(made: Definition) -> dict[str, object]:
         "outputs": [(one.name, one.each_step) for one in sorted(made.outputs, key=_named)],
         "send": made.send,
         "derivative": made.given.derivative,
-        "gives": "" if made.given.name == made.kind.gives else made.given.name,
+        "gives": "" if made.given.name == made.kind.gives or made.kind == FEED else made.given.name,
         "per_second": None if made.per_second == 1 else made.per_second,
         "acts": [(one.name, *act) for one in sorted((*made.gives, *made.state), key=_named) for act in one.acts],
         "fires": made.fires,

@@ -19,9 +19,9 @@ from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import (
     AT_SPIKE,
     DRIVE,
+    JOINING,
     PHASES,
     RULE,
-    SYNAPSE,
     Advance,
     Diffuse,
     Gather,
@@ -91,7 +91,7 @@ def _updating(number: int, population: Population) -> list[Operation]:
 def _at_once(populations: tuple[Population, ...], projections: tuple[Projection, ...]) -> Iterator[Operation]:
     """What spikes do that are without delay, behind all of them."""
     for number, one in enumerate(projections):
-        if one.kind == SYNAPSE and one.at_once:
+        if one.kind in JOINING and one.at_once:
             yield Receive(number, ("on_pre",))
     for number, population in enumerate(populations):
         if any(port.now is not None for port in population.ports):

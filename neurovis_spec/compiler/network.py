@@ -441,7 +441,8 @@ class Network:
 
     @cached_property
     def synapses(self) -> Located:
-        """The projections, and for each connection which of them its synapse is (−1: it has none)."""
+        """The projections, and for each connection which of them its synapse is (−1: it has none), and which of its
+        members has its states: where these are shared another connection is that."""
         numbers, positions = (np.broadcast_to(np.int64(one), (len(self.connections),)) for one in (-1, 0))
         joined = [number for number, projection in enumerate(self.projections) if projection.kind == SYNAPSE]
         if joined:
@@ -449,7 +450,19 @@ class Network:
         for number in joined:
             members = self.projections[number].members
             numbers[members], positions[members] = number, np.arange(len(members))
+        for one in self.projections:
+            if one.slots is not None:
+                numbers[one.members], positions[one.members] = one.feeds, one.slots
         return Located(self.projections, numbers, positions)
+
+    @cached_property
+    def fed(self) -> Mapping[int, IntArray]:
+        """By projections of shared synapses the connections that add to their states, ascending."""
+        found: dict[int, list[IntArray]] = {}
+        for one in self.projections:
+            if one.slots is not None:
+                found.setdefault(one.feeds, []).append(one.members)
+        return {number: frozen(np.sort(np.concatenate(members))) for number, members in found.items()}
 
     @property
     def uses(self) -> Iterator[tuple[Holder, Use]]:

@@ -113,6 +113,10 @@ MODEL = Kind("model", "neuron", "activity")
 RULE = Kind("rule", "connection", "weight", lasting=True)
 #: What a connection brings to its ports, from its weight, what is known of both ends, and states of its own.
 SYNAPSE = Kind("synapse", "connection", "signal")
+#: What connections add to states of a shared synapse, of which there is one for all of an entry at a target.
+FEED = Kind("feed", "connection", "added", lasting=True)
+#: Of what makes synapses.
+JOINING: Final = (SYNAPSE, FEED)
 
 #: The function of an activation that says whether it is undefined for an argument.
 UNDEFINED_F = "f is undefined"
@@ -174,6 +178,8 @@ class Definition:
     sign: Tree | None = None
     #: of a model whether it has a spike block: a state SPIKE, and the phases "fire" and "settle"
     fires: bool = False
+    #: of a synapse whether all connections of an entry that lead to the same target have its states together
+    shared: bool = False
 
     def during(self, phases: Collection[Phase]) -> Definition:
         """The same with what is carried out of it in these phases."""
@@ -216,7 +222,7 @@ class Definition:
     @property
     def moves_centre(self) -> bool:
         """Whether it is a rule that changes the centre of a connection, in place of the weight."""
-        return self.kind.lasting and self.given.name == CENTRE
+        return self.kind == RULE and self.given.name == CENTRE
 
     @property
     def flows(self) -> tuple[Quantity, ...]:
@@ -404,6 +410,9 @@ class Projection:
     when: str = ""
     #: of a synapse that spikes change whether its connections have no delay, so that they do behind all of the step
     at_once: bool = False
+    #: of a FEED the number of the projection to whose states it adds, else −1; and to those of which of its members
+    feeds: int = -1
+    slots: IntArray | None = None
 
     @property
     def asks(self) -> frozenset[str]:

@@ -7,6 +7,7 @@ where each of them finds what it reads.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,9 +16,10 @@ from neurovis_spec.arrays import Indices, IntArray, frozen
 from neurovis_spec.compiler.connections.connect import Connected
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.connections.in_use import InUse, Piece
+from neurovis_spec.compiler.connections.shared import receptor_and_feed
 from neurovis_spec.compiler.connections.signals import Signal
 from neurovis_spec.compiler.network import Outlet, outlets_of, taken_at
-from neurovis_spec.compiler.program import RULE, SYNAPSE, EndName, Owner, Population, Projection, Use
+from neurovis_spec.compiler.program import FEED, RULE, SYNAPSE, Definition, EndName, Owner, Population, Projection, Use
 
 
 class Projected(NamedTuple):
@@ -40,6 +42,11 @@ class _Alike(NamedTuple):
     population: int = -1
     at_once: bool = False
 
+    @property
+    def receptor(self) -> _Alike:
+        """Of a feed what has in common that to which it adds."""
+        return self._replace(kind=SYNAPSE.name, at_once=False)
+
 
 class _Some(NamedTuple):
     """Connections of an entry that are members of one projection: their indices in the network, and which of the piece
@@ -59,7 +66,7 @@ class _Some(NamedTuple):
 def make_projections(made: Connected, populations: tuple[Population, ...]) -> Projected:
     """One Projection a rule, at a place among those of its connections, and one a synapse and population of targets,
     whichever entries they are of: what is computed alike is computed together. Rules come first."""
-    found: dict[str, dict[_Alike, list[_Some]]] = {RULE.name: {}, SYNAPSE.name: {}}
+    found: dict[str, dict[_Alike, list[_Some]]] = {RULE.name: {}, SYNAPSE.name: {}, FEED.name: {}}
     population_of = np.zeros(sum(len(one.members) for one in populations), dtype=np.int64)
     for number, population in enumerate(populations):
         population_of[population.members] = number
@@ -67,26 +74,38 @@ def make_projections(made: Connected, populations: tuple[Population, ...]) -> Pr
     for bundle in made.bundles:
         for use in bundle.uses:
             for piece in use.pieces:
-                of_kind = found[piece.definition.kind.name]
-                for key, inside in _alike(use, piece, bundle, population_of):
-                    some = _Some(use, piece, start + piece.places[inside], inside)
-                    of_kind.setdefault(key, []).append(some)
+                for part in receptor_and_feed(piece) if piece.definition.shared else (piece,):
+                    for key, inside in _alike(use, part, piece.definition, bundle, population_of):
+                        some = _Some(use, part, start + part.places[inside], inside)
+                        found[key.kind].setdefault(key, []).append(some)
         start += len(bundle.sources)
-    alike = {**found[RULE.name], **found[SYNAPSE.name]}
+    alike = {**found[RULE.name], **found[SYNAPSE.name], **found[FEED.name]}
     outlets = outlets_of(populations, _asked(made.bundles))
     ends = _Ends(made, populations, outlets, len(population_of))
-    projections = tuple(_projection(number, *one, ends) for number, one in enumerate(alike.items()))
-    targets = {number: key.population for number, key in enumerate(alike) if key.population >= 0}
-    return Projected(projections, tuple(_first_rules(made, projections)), targets)
+    numbers = {key: number for number, key in enumerate(alike)}
+    projections = [_projection(number, *one, ends) for number, one in enumerate(alike.items())]
+    for key, number in numbers.items():
+        if key.kind == FEED.name:
+            projections[number] = _feeding(projections, number, numbers[key.receptor], made)
+    targets = {number: key.population for key, number in numbers.items() if key.population >= 0}
+    return Projected(tuple(projections), tuple(_first_rules(made, projections)), targets)
+
+
+def _feeding(projections: Sequence[Projection], number: int, feeds: int, made: Connected) -> Projection:
+    """A feed with what it adds to: of which projection, and to which of its members."""
+    one, receptor = projections[number], projections[feeds]
+    slots = np.searchsorted(receptor.members, made.carriers[one.members])
+    return replace(one, feeds=feeds, slots=frozen(slots))
 
 
 def _alike(
-    use: InUse, piece: Piece, bundle: Bundle, population_of: IntArray
+    use: InUse, piece: Piece, whole: Definition, bundle: Bundle, population_of: IntArray
 ) -> Iterator[tuple[_Alike, IntArray | slice]]:
-    """The connections of a piece by what projections they are members of."""
+    """The connections of a piece by what projections they are members of; its definition is ``whole``, or a part of
+    that. Of those with a receptor these alone that carry it."""
     definition = piece.definition
-    read = {name.text for name in definition.end_names}
-    names = definition.kind.name, definition.name, tuple(one for one in definition.parameters if one in read)
+    read = {name.text for name in whole.end_names}
+    names = definition.kind.name, definition.name, tuple(one for one in whole.parameters if one in read)
     if definition.kind == RULE:
         yield _Alike(*names, use.place), slice(None)
         return
@@ -95,6 +114,8 @@ def _alike(
     for population in np.flatnonzero(np.bincount(populations)).tolist():
         for now in (False, True):
             inside = np.flatnonzero((populations == population) & (at_once == now))
+            if whole.shared and definition.kind == SYNAPSE and bundle.carriers is not None:
+                inside = inside[bundle.carriers[piece.places[inside]] == piece.places[inside]]
             if len(inside):
                 yield _Alike(*names, use.place, population, now), inside
 
@@ -107,7 +128,7 @@ def _asked(bundles: Sequence[Bundle]) -> set[str]:
     return read.union(signals, (one.route.sends for one in bundles))
 
 
-def _first_rules(made: Connected, projections: tuple[Projection, ...]) -> Iterator[Indices]:
+def _first_rules(made: Connected, projections: Sequence[Projection]) -> Iterator[Indices]:
     """For each entry the projection of the first rule of each of its connections, −1 without."""
     firsts = [(number, one) for number, one in enumerate(projections) if one.kind == RULE and one.place == 0]
     start = 0

@@ -32,8 +32,8 @@ from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.lower import receiving
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
+    JOINING,
     PHASES,
-    SYNAPSE,
     UNDEFINED_F,
     Check,
     Definition,
@@ -88,7 +88,7 @@ def _receiving(network: Network, projections: tuple[Projection, ...]) -> tuple[O
     targets = {
         number: int(numbers[network.connections.targets[one.members[:1]][0]])
         for number, one in enumerate(projections)
-        if one.kind == SYNAPSE
+        if one.kind in JOINING
     }
     return receiving(network.program, projections, targets)
 
@@ -155,7 +155,7 @@ class _Checks:
             self.is_set(array) or bool(np.isfinite(values[members]).any())
             for array, values in ((LOW, connections.low), (HIGH, connections.high))
         )
-        bounded &= projection.kind != SYNAPSE  # which gives a signal
+        bounded &= projection.kind not in JOINING  # whose weights nothing changes
         hidden = Hidden.INFINITY if bounded else Hidden.NOTHING  # bounds make a number of an infinite weight
         checks = [self.of_use(use, hidden)[0] for use in projection.uses]
         if not any(checks):

@@ -56,7 +56,8 @@ class Line(NamedTuple):
 class Wired:
     """The connections, as far as levels go by them: an entry has one of the ``routes``, and ``entry`` says of each
     connection which entry it is of; ``timed`` which have a delay above 0 in seconds, None where none has.
-    ``synapses`` and ``rules`` are by the numbers of entries that have some."""
+    ``synapses`` and ``rules`` are by the numbers of entries that have some; ``silent`` which bring nothing to a port
+    themselves, None where all do."""
 
     sources: IntColumn
     targets: IntColumn
@@ -66,6 +67,7 @@ class Wired:
     timed: BoolArray | None = None
     synapses: Mapping[int, Definition] = field(default_factory=dict)
     rules: Mapping[int, Sequence[Definition]] = field(default_factory=dict)
+    silent: BoolArray | None = None
 
     @property
     def flow(self) -> bool:
@@ -75,12 +77,13 @@ class Wired:
     @cached_property
     def lines(self) -> Mapping[str, Line]:
         """By ports what arrives there."""
-        if all(route == PLAIN_ROUTE for route in self.routes):
+        if self.silent is None and all(route == PLAIN_ROUTE for route in self.routes):
             return {DRIVE: Line()}
         entry, result = self.entry.compact(), {DRIVE: Line(np.zeros(0, dtype=np.int64))}
         for port in dict.fromkeys(name for route in self.routes for name, _ in route.ports):
             factor = np.array([dict(route.ports).get(port, np.nan) for route in self.routes])
-            there = np.flatnonzero(~np.isnan(factor)[entry])
+            brings = ~np.isnan(factor)[entry]
+            there = np.flatnonzero(brings if self.silent is None else brings & ~self.silent)
             factors = factor[entry[there]]
             result[port] = Line(frozen(narrow(there)), None if (factors == 1).all() else frozen(factors))
         return result

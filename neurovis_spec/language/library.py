@@ -197,11 +197,6 @@ def _elsewhere(name: str) -> tuple[str, str] | None:
     return None
 
 
-def not_yet(name: str, *later: str) -> tuple[str, str] | None:
-    """What is said of a key that the language is to have, if it is one of ``later``: a message and a hint."""
-    return (f"'{name}' is not there yet", "a later version of the language has it") if name in later else None
-
-
 class Parts(NamedTuple):
     """What a definition says, whatever its kind: what it gives at each step and at an episode's end, or changes by over
     the time of a step, and of what that is made. ``gives`` is how that is called where it is not as in all definitions
@@ -223,6 +218,8 @@ class Parts(NamedTuple):
     time: TimeUnit = "s"
     sign: Formula | None = None
     spike: SpikeModel | None = None
+    #: whether its states are those of all connections of an entry to the same target
+    shared: bool = False
 
     @property
     def units(self) -> AnyMapping[str, str]:
@@ -478,11 +475,23 @@ class SynapseModel(TimedModel):
     sign: Annotated[FormulaField, IN_SIGN] | None = Field(
         None, description="How its line ends: above 0 in an arrow, below 0 in a bar, at 0 in nothing (default weight)."
     )
+    shared: BoolField | None = Field(
+        None,
+        description="Whether all connections of an entry to the same target have its states together (default false).",
+    )
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
 
     def parts(self) -> Parts:
         """What it says."""
-        return Parts(self.parameters, self.let, self.signal, state=self.state, time=self.unit_of_time, sign=self.sign)
+        return Parts(
+            self.parameters,
+            self.let,
+            self.signal,
+            state=self.state,
+            time=self.unit_of_time,
+            sign=self.sign,
+            shared=value_or(self.shared, False),
+        )
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
@@ -490,7 +499,7 @@ class SynapseModel(TimedModel):
             return "'ports' are of models; the connection says to which its synapse goes", "write port: … there"
         if name in ("spike", "on_pre"):
             return f"'{name}' is no key of a synapse", "write on_pre: … at a state, what becomes of it at a spike"
-        return not_yet(name, "shared")
+        return None
 
 
 class Library(Model):

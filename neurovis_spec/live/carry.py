@@ -19,6 +19,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Projection
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError, Turned
 from neurovis_spec.live.turns import Feed, turn
@@ -162,11 +163,25 @@ def _carry_states(
         each = use.definition.kind.each
         for name, array in old.cells[use.owner].items():
             found.setdefault((each, name), np.full(sizes[each], np.nan))[holder.members] = array
+    together = _together(was, old)
     sizes = {"neuron": len(network.neurons), "connection": len(network.connections)}
     for holder, use in network.uses:
         each = use.definition.kind.each
         for name, array in state.cells[use.owner].items():
             _gather(found.get((each, name)), holder.members, array, shared[each], sizes[each])
+            if isinstance(holder, Projection) and use.owner.number in network.fed:
+                _gather(together.get(name), holder.members, array, shared[each], sizes[each])
+
+
+def _together(was: Network, old: State) -> dict[str, FloatArray]:
+    """The states of shared synapses, at all connections that have them together: in an edited network another one may
+    be the first."""
+    found: dict[str, FloatArray] = {}
+    for number, members in was.fed.items():
+        for name, array in old.cells[was.projections[number].use.owner].items():
+            values = found.setdefault(name, np.full(len(was.connections), np.nan))
+            values[members] = array[was.synapses.positions[members]]
+    return found
 
 
 def _gather(

@@ -107,7 +107,7 @@ class RecordedSource:
         (snapshot,) = snapshots_of(self.network, self._recording, [self.step])
         now = self._by_events().conditions
         states = None if self._states is None else self._recording.states[self._row, self._states]
-        lesioned = now.lesioned_neurons.copy(), now.structure.gone.copy()
+        lesioned = now.lesioned_neurons.copy(), now.structure.cut.copy()
         return Seen(snapshot, *lesioned, now.held.order[: len(self.network.neurons)] >= 0, states)
 
     def after(self) -> After:

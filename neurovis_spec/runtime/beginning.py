@@ -14,7 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import CENTRE, RULE, Key, Population
+from neurovis_spec.compiler.program import CENTRE, RULE, Holder, Key, Population, Use
 from neurovis_spec.runtime.lags import lags_of
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.stages import taken_by
@@ -80,11 +80,10 @@ class Beginnings:
         network, begin = self.network, self._begin()
         chosen = np.zeros(len(network.neurons), dtype=np.bool_)
         chosen[neurons] = True
-        sources, targets = network.connections.sources.whole(), network.connections.targets.whole()
-        touched = chosen[sources] | chosen[targets]
+        sources = network.connections.sources.whole()
         cells: dict[Key, tuple[IntArray, FloatArray]] = {}
         for holder, use in network.uses:
-            members = np.flatnonzero((chosen if isinstance(holder, Population) else touched)[holder.members])
+            members = np.flatnonzero(self._goes_back(holder, use, chosen))
             for one in use.definition.kept if len(members) else ():
                 if not (use.definition.moves_centre and one.name == CENTRE):
                     cells[Key(use.owner, one.name)] = members, begin.cells[use.owner][one.name][members]
@@ -108,6 +107,17 @@ class Beginnings:
             columns=columns,
             column_values=taken[columns],
         )
+
+    def _goes_back(self, holder: Holder, use: Use, chosen: BoolArray) -> BoolArray:
+        """Which members of a holder do where these neurons (n,) do; states of a shared synapse are those of the
+        target."""
+        if isinstance(holder, Population):
+            return chosen[holder.members]
+        connections = self.network.connections
+        at_target = chosen[connections.targets[holder.members]]
+        if use.owner.number in self.network.fed:
+            return at_target
+        return at_target | chosen[connections.sources[holder.members]]
 
     def _begin(self) -> State:
         """The state before the first step: activities are those with which neurons begin, 0 where they are computed;

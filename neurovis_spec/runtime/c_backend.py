@@ -53,9 +53,9 @@ _NEVER: Final = 1 << 62
 #: ``nv_state``: of a State ``activity``, ``weights``, ``signals``, ``history``, ``outlets``, and ``cells``, one pointer
 #: for each state or output of a model or a rule; ``x``: the numbers that can be set; ``parameters``; ``s``: the inputs
 #: of the step; ``reads``: of each input whether the step computes it by its expression; ``held``, ``holding``,
-#: ``lesioned``, ``gone``, ``still``, ``lost``, ``before``, ``packed``: as ``Form`` says; ``given``: the tables that are
-#: too long for the text; ``work``: what an integration keeps, and arrays of what arrives. ``k`` and ``form``: the step
-#: that ``nv_once`` makes, and its form.
+#: ``lesioned``, ``gone``, ``cut``, ``still``, ``lost``, ``before``, ``packed``: as ``Form`` says; ``given``: the tables
+#: that are too long for the text; ``work``: what an integration keeps, and arrays of what arrives. ``k`` and ``form``:
+#: the step that ``nv_once`` makes, and its form.
 #:
 #: ``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; the inputs of
 #: each are a row of ``rows``, but for those that the step computes, which it puts there. Steps that ``every`` divides
@@ -78,7 +78,7 @@ _HEAD: Final = """#include <math.h>
 typedef struct {
     double *activity, *weights, *signals, *history, *outlets, *s;
     const double *x, *parameters, *holding;
-    const uint8_t *reads, *held, *lesioned, *gone, *still;
+    const uint8_t *reads, *held, *lesioned, *gone, *cut, *still;
     const int64_t *lost;
     const void *const *given;
     double *const *cells;
@@ -281,7 +281,7 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
     of_inputs, of_step = ", int64_t k, double *restrict s", ", int64_t k, const double *restrict s"
     of_signals = ", int64_t k, const double *restrict weights, double *restrict formed"
     plain = Form(written_out=small, follows=True, watched=watched)
-    general = Form(first=True, held=True, fixed=True, fixed_joined=True, gone=True, still=True, lost=True)
+    general = Form(first=True, held=True, fixed=True, fixed_joined=True, gone=True, cut=True, still=True, lost=True)
     fused = Form(follows=True, fused=True)
     return (
         _Function("double", "nv_read", Form(watched=True), StepCode.read, of_inputs),
@@ -296,7 +296,7 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
             only="fused",
         ),
         _Function("void", "nv_let_out", Form(), StepCode.let_all_out, only="late"),
-        _Function("void", "nv_signals", Form(gone=True, lost=True), StepCode.signals, of_signals),
+        _Function("void", "nv_signals", Form(gone=True, cut=True, lost=True), StepCode.signals, of_signals),
         _Function("void", "nv_pack", fused, StepCode.pack, only="fused"),
         _Function("void", "nv_leave", fused, lambda step: step.leave(step.fuses), only="fused"),
     )
@@ -314,7 +314,7 @@ def _pointer_lines(network: Network, plan: c_plan.Plan | None) -> dict[str, str]
     kinds = (
         ("double", ("activity", "weights", "signals", "history", "outlets", "packed")),
         ("const double", ("x", "parameters", "holding", "before")),
-        ("const uint8_t", ("reads", "held", "lesioned", "gone", "still")),
+        ("const uint8_t", ("reads", "held", "lesioned", "gone", "cut", "still")),
         ("const int64_t", ("lost",)),
     )
     lines = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
@@ -364,7 +364,7 @@ def _look(built: Built, watched: bool) -> _Looks:
 
 _POINTERS: Final = (
     *("activity", "weights", "signals", "history", "outlets", "s", "x", "parameters", "holding"),
-    *("reads", "held", "lesioned", "gone", "still", "lost", "given", "cells", "before", "packed", "work"),
+    *("reads", "held", "lesioned", "gone", "cut", "still", "lost", "given", "cells", "before", "packed", "work"),
 )
 
 
@@ -574,10 +574,12 @@ class CStepper:
                 self._holding[neurons] = values
         self._lesioned = _bytes(now.lesioned_neurons)
         pointers.lesioned = self._lesioned.ctypes.data
-        self._gone, self._still = (_bytes(mask) for mask in (now.structure.gone, now.structure.still))
+        structure = now.structure
+        self._gone, self._cut, self._still = map(_bytes, (structure.gone, structure.cut, structure.still))
         pointers.held, pointers.holding = self._held.ctypes.data, self._holding.ctypes.data
         self._lost = np.ascontiguousarray(now.structure.lost, dtype=np.int64)
         pointers.gone, pointers.still = self._gone.ctypes.data, self._still.ctypes.data
+        pointers.cut = self._cut.ctypes.data
         pointers.lost = self._lost.ctypes.data
 
 

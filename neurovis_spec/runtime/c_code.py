@@ -126,6 +126,8 @@ class Form:
     fixed_joined: bool = False
     #: connections whose byte of ``gone`` is set are left out
     gone: bool = False
+    #: so are, of those that add to states of shared synapses, those whose byte of ``cut`` is set
+    cut: bool = False
     #: connections whose byte of ``still`` is set do not learn
     still: bool = False
     #: what a connection has sent before its step in ``lost`` never arrives

@@ -14,7 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import RULE, SYNAPSE, Definition, Key, Population, Projection
+from neurovis_spec.compiler.program import JOINING, RULE, Definition, Key, Population, Projection
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
@@ -193,7 +193,7 @@ class Sight:
 
     def behind(self, projection: Projection) -> dict[str, str]:
         """Which states of the target are read as they are behind the integration, by the names in formulas."""
-        return behind_flow(self.network, projection) if projection.kind == SYNAPSE else {}
+        return behind_flow(self.network, projection) if projection.kind in JOINING else {}
 
     def target(self, projection: Projection) -> Population:
         """Where the connections of a synapse lead."""

@@ -43,8 +43,8 @@ from neurovis_spec.runtime.state import NEVER_LOST, Mask, State, by_kind, initia
 
 @dataclass(frozen=True)
 class Phase:
-    """What is held and left out from a step on, by events: at that step ``gone``, ``still`` and ``lost`` are those of
-    Structure, ``order`` and ``clamps`` those of Held."""
+    """What is held and left out from a step on, by events: at that step ``gone``, ``cut``, ``still`` and ``lost`` are
+    those of Structure, ``order`` and ``clamps`` those of Held."""
 
     #: the step, −1 for what is so before any
     at: int
@@ -52,6 +52,7 @@ class Phase:
     order: tuple[int, ...]
     lesioned: Mask
     gone: Mask
+    cut: Mask
     still: Mask
     lost: IntArray
     #: the clamps that hold, by their order
@@ -157,7 +158,14 @@ class Exported:
         structure = now.structure
         lesioned, clamps = now.lesioned_neurons.copy(), dict(now.held.active)
         return Phase(
-            at, order, lesioned, gone=structure.gone, still=structure.still, lost=structure.lost, clamps=clamps
+            at,
+            order,
+            lesioned,
+            gone=structure.gone,
+            cut=structure.cut,
+            still=structure.still,
+            lost=structure.lost,
+            clamps=clamps,
         )
 
     @cached_property
@@ -405,10 +413,11 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         return starts
 
     def _left_out(self) -> dict[str, tuple[str, list[npt.NDArray[np.integer]]]]:
-        """Those of ``gone``, ``still`` and ``lost`` that a step has to look at, as events leave something out by them:
-        the type in C, and the array in each phase."""
+        """Those of ``gone``, ``cut``, ``still`` and ``lost`` that a step has to look at, as events leave something out
+        by them: the type in C, and the array in each phase."""
         phases, found = self.phases, dict[str, tuple[str, list[npt.NDArray[np.integer]]]]()
-        for name, masks in (("gone", [phase.gone for phase in phases]), ("still", [phase.still for phase in phases])):
+        for name in ("gone", *(["cut"] if self.network.fed else []), "still"):
+            masks: list[Mask] = [getattr(phase, name) for phase in phases]
             if any(mask.any() for mask in masks):
                 found[name] = "unsigned char", [mask.astype(np.uint8) for mask in masks]
         if any((phase.lost > NEVER_LOST).any() for phase in phases):
@@ -427,6 +436,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             fixed=self.fixing,
             fixed_joined=self.fixing_joined,
             gone="gone" in left_out,
+            cut="cut" in left_out,
             still="still" in left_out,
             lost="lost" in left_out,
         )
@@ -527,7 +537,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             if len(change.reset):
                 self._silence(code, self._controls.beginnings.rewind(change.reset).lost)
             if after != phase:
-                self._silence(code, np.flatnonzero(self.phases[phase].gone & ~self.phases[after].gone))
+                self._silence(code, np.flatnonzero(self.phases[phase].cut & ~self.phases[after].cut))
                 code.line(f"state->phase = {after};")
             if self.holding:
                 code.line("nv_hold(state);")

@@ -766,18 +766,26 @@ class StepCode:
         """The states of synapses from old values; of connections that are left out they stay."""
         code, number = self.code, operation.projection
         projection = self.network.projections[number].during(operation.phases)
-        made, members = replace(projection.use.definition, gives=()), projection.members
-        changes = [tree for one in made.state for tree in (one.each_step, one.each_episode)]
+        made, members = projection.use.definition, projection.members
+        if projection.slots is None:
+            made = replace(made, gives=())
+        changes = [tree for one in made.lasting for tree in (one.each_step, one.each_episode)]
         read = unfolded(made.let, changes).names
         self.hold_ahead(target_of(self.network, projection))
 
         def received(place: Place, totals: Mapping[int, str] = _NO_TOTALS) -> None:
             some = Some(number, np.arange(len(members)), place)
-            conditions = [f"!gone[{code.at(members, place)}]"] if self.form.gone else []
+            left_out = ("cut", self.form.cut) if projection.slots is not None else ("gone", self.form.gone)
+            conditions = [f"!{left_out[0]}[{code.at(members, place)}]"] if left_out[1] else []
             conditions += self.sight.comes(projection, some) if self.form.written_out else []  # a row knows of it
             with code.block(f"if ({' && '.join(conditions)})") if conditions else nullcontext():
                 stored, seen = self.sight.states(some), self.sight.known(some, read)
                 kept = partial(self.unless_held, projection.use, place)
+                if projection.slots is not None:
+                    receptor, slot = self.network.projections[projection.feeds].use, code.at(projection.slots, place)
+                    of_receptor = self.states(receptor, slot)
+                    stored |= {one.name: of_receptor[one.name] for one in made.gives}
+                    kept = partial(self.unless_held, receptor, slot)
                 new, _ = self.change(made, seen, stored, bounded=kept, begins=self.form.first)
                 stores = [(stored[name], value) for name, value in new.items()]
                 if self.form.watched and projection.when:
@@ -787,6 +795,11 @@ class StepCode:
         if projection.when and not self.form.written_out:
             with self.rows(projection, self.sight) as place:
                 received(place)
+        elif projection.when and projection.slots is not None:  # where the order counts, in that of the rows
+            end, delays = self.sight.end_at(projection)
+            for place in rows_of(end.places, delays).order.tolist():
+                with code.block(""):
+                    received(place)
         else:
             self.each(len(members), _NO_ARRIVALS, received)
 
@@ -816,11 +829,33 @@ class StepCode:
         for number, projection in enumerate(self.network.projections):
             if projection.kind != SYNAPSE:
                 continue
+            if number in self.network.fed:
+                self.shared_signals(number)
+                continue
             members, forming = projection.members, Forming(self.behind, {number: signal_of(projection)})
             with code.block(code.loop("q", len(members))):
                 connection = code.at(members, "q")
                 value = code.text(forming.value(Some(number, np.arange(len(members)), "q"), {}))
                 code.line(f"formed[{connection}] = gone[{connection}] ? {code.text(0.0)} : {value};")
+
+    def shared_signals(self, number: int) -> None:
+        """The same of a shared synapse: of each connection its share, by its weight over the weights of all of them at
+        a target, which are added up where the first of these has its signal: it comes last."""
+        code, projection, members = self.code, self.network.projections[number], self.network.fed[number]
+        slots = self.network.synapses.positions[members]
+        carriers, forming = projection.members[slots], Forming(self.behind, {number: signal_of(projection)})
+        zero = code.text(0.0)
+        with code.block(code.loop("q", len(projection.members))):
+            code.line(f"formed[{code.at(projection.members, 'q')}] = {zero};")
+        with code.block(code.loop("q", len(members))):
+            connection = code.at(members, "q")
+            code.line(f"formed[{code.at(carriers, 'q')}] += cut[{connection}] ? {zero} : weights[{connection}];")
+        behind = members[::-1].copy()
+        with code.block(code.loop("q", len(behind))):
+            connection, total = code.at(behind, "q"), code.let("t", f"formed[{code.at(carriers[::-1].copy(), 'q')}]")
+            value = code.text(forming.value(Some(number, slots[::-1].copy(), "q"), {}))
+            left_out = f"cut[{connection}] || {total} == 0"
+            code.line(f"formed[{connection}] = {left_out} ? {zero} : {value}*(weights[{connection}]/{total});")
 
     def learn(self, operation: Learn) -> None:
         """The rule of a projection: in a loop several connections side by side, then one by one those that are left.

@@ -124,7 +124,7 @@ class Controls:
         now.lesioned_connections[self.network.connections.with_twins(connections)] = False
         before = now.structure
         self.restructure(state)
-        lose(self.network, state, np.flatnonzero(before.gone & (before.since < state.k) & ~now.structure.gone))
+        lose(self.network, state, np.flatnonzero(before.cut & (before.since < state.k) & ~now.structure.cut))
 
     def learn(self, state: State, connections: IntArray, on: bool) -> None:
         """Switch the rules of connections on or off; weights and states of a rule that is off stay as they are."""
@@ -163,11 +163,15 @@ class Controls:
     def restructure(self, state: State) -> None:
         """Work out what a step leaves out, and put it into ``conditions.structure``: another object only where it
         changes, as backends make their code anew for it."""
-        connections, now = self.network.connections, state.conditions
+        connections, now, before = self.network.connections, state.conditions, state.conditions.structure
         silent = now.lesioned_neurons
-        gone = silent[connections.sources.whole()] | silent[connections.targets.whole()] | now.lesioned_connections
-        still = gone | now.paused
-        if not (np.array_equal(gone, now.structure.gone) and np.array_equal(still, now.structure.still)):
-            since = np.where(gone & ~now.structure.gone, state.k, now.structure.since)
-            now.structure = replace(now.structure, gone=gone, since=since, still=still)
+        cut = silent[connections.sources.whole()] | silent[connections.targets.whole()] | now.lesioned_connections
+        gone, still = cut, cut | now.paused
+        if self.network.fed:
+            gone = cut.copy()
+            carriers = np.concatenate([self.network.projections[number].members for number in self.network.fed])
+            gone[carriers] = silent[connections.targets[carriers]]
+        if not all(map(np.array_equal, (gone, cut, still), (before.gone, before.cut, before.still))):
+            since = np.where(cut & ~before.cut, state.k, before.since)
+            now.structure = replace(before, gone=gone, cut=cut, since=since, still=still)
         self.hold(now)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SYNAPSE, Key, Projection, Use
 from neurovis_spec.language.expressions.evaluate import Given, evaluate_array
@@ -73,8 +73,10 @@ class Forming:
         with np.errstate(all="ignore"):
             result: FloatArray = weights * sent[taken_by(self._network)]
             for one in self._synapses:
-                result[one.projection.members] = self.formed(one, state, sent, weights)
-        result[state.conditions.structure.gone] = 0.0
+                made, cut = self.formed(one, state, sent, weights), state.conditions.structure.cut
+                members, shares = shares_of(self._network, one.projection, weights, cut)
+                result[members] = made if shares is None else made[self._network.synapses.positions[members]] * shares
+        result[state.conditions.structure.cut] = 0.0
         return result
 
     def formed(self, of: _Synapses, state: State, sent: FloatArray, weights: FloatArray) -> FloatArray:
@@ -96,6 +98,19 @@ class Forming:
             known[name] = evaluate_array(tree, known, by=self._by)
         ((_, tree),) = of.formulas.trees
         return np.broadcast_to(evaluate_array(tree, known, by=self._by), members.shape)
+
+
+def shares_of(
+    network: Network, projection: Projection, weights: FloatArray, cut: BoolArray
+) -> tuple[IntArray, FloatArray | None]:
+    """The connections that have a synapse, and which share of a signal each of them brings, where it is shared: its
+    weight over those of all that add to the same, as far as they are not ``cut``."""
+    members = network.fed.get(projection.use.owner.number)
+    if members is None:
+        return projection.members, None
+    slots, own = network.synapses.positions[members], np.where(cut[members], 0.0, weights[members])
+    total = np.bincount(slots, own, len(projection.members))[slots]
+    return members, np.where(total == 0, 0.0, own / total)
 
 
 def parameters_of(network: Network, use: Use, variables: FloatArray | None) -> dict[str, FloatArray]:

@@ -69,7 +69,9 @@ class Step:
         signals, ends = (
             {name: indices[some] for name, indices in one.items()} for one in (projection.signals, projection.ends)
         )
-        return Working(replace(projection, members=projection.members[some], signals=signals, ends=ends), some)
+        slots = None if projection.slots is None else projection.slots[some]
+        members = projection.members[some]
+        return Working(replace(projection, members=members, signals=signals, ends=ends, slots=slots), some)
 
 
 class Working(NamedTuple):

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from neurovis_spec.compiler.program import SYNAPSE, Key, Projection
+from neurovis_spec.compiler.program import JOINING, Key, Projection
 from neurovis_spec.runtime.events import rows_of
 from neurovis_spec.runtime.numpy_arrivals import Step, Working, all_sent
 from neurovis_spec.runtime.numpy_lags import behind_lags
@@ -47,7 +47,7 @@ def seen_by(step: Step, working: Working, which: str, read: Collection[str]) -> 
     for name, values in use.parameters.items():
         if name in read:
             seen[name] = code.numbers_of(Key(use.owner, name), values, some, which)
-    is_synapse = projection.kind == SYNAPSE
+    is_synapse = projection.kind in JOINING
     behind = behind_flow(step.network, projection) if is_synapse else {}
     late = {} if is_synapse else behind_lags(step, projection)
     for name, end in ends_of(step.network, projection).items():

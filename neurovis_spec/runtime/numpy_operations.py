@@ -20,7 +20,7 @@ Every identifier is new: its letter says what it is, its number sets it apart. c
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import singledispatch
 
@@ -33,6 +33,7 @@ from neurovis_spec.compiler.network import Network, Outlet
 from neurovis_spec.compiler.program import (
     MODEL,
     Advance,
+    Definition,
     Diffuse,
     Gather,
     Integrate,
@@ -47,6 +48,7 @@ from neurovis_spec.compiler.program import (
     Update,
     Use,
 )
+from neurovis_spec.compiler.values.shared import added_by
 from neurovis_spec.runtime.numpy_arrivals import (
     Step,
     Working,
@@ -127,20 +129,46 @@ def _receive(operation: Receive, step: Step) -> None:
     """The states of synapses."""
     code, (whole, some) = step.code, step.working(operation.projection)
     projection = whole.during(operation.phases)
-    definition = replace(projection.use.definition, gives=())  # signals are formed at ports
+    definition = projection.use.definition
+    if projection.slots is None:
+        definition = replace(definition, gives=())  # signals are formed at ports
     if not len(projection.members):
         return
-    trees = (tree for one in definition.state for tree in (one.each_step, one.each_episode))
+    trees = (tree for one in definition.lasting for tree in (one.each_step, one.each_episode))
     read = unfolded(definition.let, trees).names
     if projection.when:
         with come_to_some(step, Working(projection, some), sent=False) as which:
             seen = seen_by(step, Working(projection, some), which, read)
             seen["weight"] = _weights_at(code, projection, which)
-            emit_change(code, definition, seen, _cells_of(code, projection, some, which), None)
+            cells = _cells_of(code, projection, some, which)
+            if projection.slots is None:
+                emit_change(code, definition, seen, cells, None)
+            else:
+                _add(step, projection, definition, seen, cells, which)
         return
     seen = code.parameters(projection.use, some) | seen_before_update(step, projection, read)
     cells = _cells_of(code, projection, some)
     emit_change(code, definition, seen, cells, step.network.episode)
+
+
+def _add(
+    step: Step,
+    projection: Projection,
+    definition: Definition,
+    seen: Mapping[str, str],
+    cells: Mapping[str, Cell],
+    which: str,
+) -> None:
+    """What connections, code says which, add to states of a shared synapse, one after the other."""
+    assert projection.slots is not None
+    code, receptor = step.code, step.network.projections[projection.feeds].use
+    slots = f"{code.constant(projection.slots.astype(np.intp))}[{which}]"
+    added = {one.name: code.name("n") for one in definition.gives}
+    alone = replace(definition, gives=tuple(replace(one, each_step=added_by(one)) for one in definition.gives))
+    emit_change(code, alone, seen, {**cells, **{name: Cell(there, there) for name, there in added.items()}}, None)
+    for name, there in added.items():
+        code.line(f"np.add.at({code.state(receptor, name)}, {slots}, {there})")
+    code.line(f"if fixed: hold_cells(fixed, {code.constant((receptor.owner,))}, cells)")
 
 
 @emit.register

@@ -39,6 +39,7 @@ from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.functions import PLAIN
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
+from neurovis_spec.runtime.events import rows_of
 from neurovis_spec.runtime.reference_flows import Flow
 from neurovis_spec.runtime.reference_seen import NO_FUNCTIONS, Functions, NetworkArray, Seen, is_first, with_let
 from neurovis_spec.runtime.stages import acts_now, formulas_of, given
@@ -232,13 +233,40 @@ class ReferenceStepper(Seen):
         """The states of synapses from old values."""
         projection = self.network.projections[operation.projection].during(operation.phases)
         self.hold_states(self.behind[operation.projection][0].model, state)
-        for position, connection in enumerate(projection.members.tolist()):
-            if not state.conditions.structure.gone[connection]:
+        idle = state.conditions.structure.idle(projection)
+        for position in self.in_turn(projection):
+            if not idle[position]:
                 seen = self.known(projection.use, position, state) | self.before_update(projection, position, state)
                 if projection.when and not seen[projection.when]:
                     continue
-                seen["weight"] = float(state.weights[connection])
-                self.change(projection.use, position, seen, state, {})
+                seen["weight"] = float(state.weights[projection.members[position]])
+                if projection.slots is None:
+                    self.change(projection.use, position, seen, state, {})
+                else:
+                    self.add(projection, position, seen, state)
+
+    def in_turn(self, projection: Projection) -> list[int]:
+        """The members of a projection in the order in which they are changed: of what adds to shared states, where the
+        order counts, in that in which spikes come."""
+        if projection.slots is None or not projection.when:
+            return list(range(len(projection.members)))
+        end = self.ends[projection.use.owner.number][projection.when]
+        order: list[int] = rows_of(end.places, self.delays[projection.members]).order.tolist()
+        return order
+
+    def add(self, projection: Projection, position: int, seen: Mapping[str, float], state: State) -> None:
+        """What a connection adds to states of a shared synapse; those that are held stay."""
+        assert projection.slots is not None
+        receptor, slot = self.network.projections[projection.feeds].use, int(projection.slots[position])
+        cells = state.cells[receptor.owner]
+        added = {
+            one.name: Bounded(float(cells[one.name][slot]), -math.inf, math.inf)
+            for one in projection.use.definition.gives
+        }
+        results = self.change(projection.use, position, seen, state, added)
+        for name in added:
+            cells[name][slot] = results[name]
+        self.hold_states(receptor, state)
 
     def learn(self, operation: Learn, state: State, inputs: FloatArray) -> None:
         """w[t+1] and the states of a rule from old values; at an episode's end, once more from what these gave."""

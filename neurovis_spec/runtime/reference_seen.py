@@ -16,7 +16,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import CENTRES, Variable, bias_of
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import CENTRE, SYNAPSE, Definition, Key, Population, Port, Projection, Use
+from neurovis_spec.compiler.program import CENTRE, JOINING, Definition, Key, Population, Port, Projection, Use
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.lags import Lags, lags_of
@@ -95,7 +95,7 @@ class Seen:
         self.behind = {
             number: (network.populations[target_of(network, one)], behind_flow(network, one))
             for number, one in enumerate(network.projections)
-            if one.kind == SYNAPSE
+            if one.kind in JOINING
         }
         self.centres = NetworkArray(connections.centres.whole(), variables.get(CENTRES))
 

@@ -5,6 +5,8 @@ In: a Network, a reference as a spec writes it. Out: indices, or KeyError with t
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
@@ -132,10 +134,21 @@ def _holders_of(network: Network, kind: Kind) -> tuple[Holder, ...]:
     )
 
 
+def _each_sharing(network: Network, synapses: Iterable[Holder]) -> Iterator[Holder]:
+    """The states of all synapses, those that are shared with all connections that have them together."""
+    numbers = (number for number, one in enumerate(network.projections) if one.kind == SYNAPSE)
+    for number, one in zip(numbers, synapses, strict=True):
+        members = network.fed.get(number)
+        if members is None:
+            yield one
+        else:
+            yield one._replace(members=members, carriers=one.members[network.synapses.positions[members]])
+
+
 def _wiring_of(network: Network) -> Wiring:
     """All connections, with the states of their rules and synapses."""
     rules, synapses = (_holders_of(network, kind) for kind in (RULE, SYNAPSE))
-    synapses = tuple(one._replace(outputs=(SYNAPSE.gives,)) for one in synapses)
+    synapses = tuple(one._replace(outputs=(SYNAPSE.gives,)) for one in _each_sharing(network, synapses))
     connections = network.connections
     ends = connections.sources.whole(), connections.targets.whole()
     return Wiring(*ends, connections.entries, rules, synapses=synapses)

@@ -79,7 +79,7 @@ def resumed_state(
         sent, known = (activity, np.True_) if kept is None else kept.sent(activity, row)
         _send(network, layout, state, -ago, sent, known, weights_at(row))
     _prolong(network, layout, state, len(rows))
-    lose(network, state, np.flatnonzero(state.conditions.structure.gone))
+    lose(network, state, np.flatnonzero(state.conditions.structure.cut))
     if kept is not None:
         kept.restore(state)
     state.activity = recording.activity[-1][column_of]

@@ -235,7 +235,7 @@ class Simulation:
         """Which neurons (n,) and connections (m,) take no part from step k on, copies; a connection is lesioned with
         either of its ends."""
         now = self._state.conditions
-        return now.lesioned_neurons.copy(), now.structure.gone.copy()
+        return now.lesioned_neurons.copy(), now.structure.cut.copy()
 
     @property
     def held(self) -> npt.NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Held
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import initial_states
-from neurovis_spec.compiler.program import CENTRE, SYNAPSE, Definition, Key, Owner, Projection
+from neurovis_spec.compiler.program import CENTRE, FEED, SYNAPSE, Definition, Key, Owner, Projection
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
 
@@ -41,9 +41,12 @@ class Structure:
     """Which connections a step leaves out. A backend that has made code for one structure makes it anew where that of a
     State is another object."""
 
-    #: (m,) those that are lesioned, or one of whose ends is
+    #: (m,) those that bring nothing, and whose synapse does nothing: those that are ``cut``; of those that carry the
+    #: states of a shared synapse, to which others add, too, those alone whose target is lesioned
     gone: Mask
-    #: (m,) the step from which each of them is gone
+    #: (m,) those that are lesioned, or one of whose ends is
+    cut: Mask
+    #: (m,) the step from which each of them is cut
     since: IntArray
     #: (m,) those whose rule is not carried out
     still: Mask
@@ -54,12 +57,13 @@ class Structure:
     @property
     def whole(self) -> bool:
         """Whether no connection is left out or still."""
-        return not (self.gone.any() or self.still.any())
+        return not (self.cut.any() or self.still.any())
 
     def idle(self, projection: Projection) -> Mask:
         """Which connections of a projection do nothing, so that their states stay: those that are gone, and of rules
-        those that are still."""
-        return np.asarray((self.gone if projection.kind == SYNAPSE else self.still)[projection.members])
+        those that are still; of what adds to shared states those that are cut."""
+        masks = {SYNAPSE: self.gone, FEED: self.cut}
+        return np.asarray(masks.get(projection.kind, self.still)[projection.members])
 
     @property
     def has_lost(self) -> bool:
@@ -137,7 +141,7 @@ def first_conditions(network: Network) -> Conditions:
         lesioned_neurons=np.zeros(n, dtype=np.bool_),
         lesioned_connections=np.zeros(m, dtype=np.bool_),
         paused=np.zeros(m, dtype=np.bool_),
-        structure=Structure(gone=nothing, since=from_start, still=nothing, lost=lost),
+        structure=Structure(gone=nothing, cut=nothing, since=from_start, still=nothing, lost=lost),
     )
 
 

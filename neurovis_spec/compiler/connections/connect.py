@@ -75,6 +75,11 @@ class Connected:
         return Column.repeated(np.arange(len(self.bundles)), self.sizes, np.int64)
 
     @property
+    def shares(self) -> bool:
+        """Whether connections have the states of a synapse together."""
+        return any(one.carriers is not None for one in self.bundles)
+
+    @property
     def sizes(self) -> IntArray:
         """How many connections each entry makes."""
         return np.array([len(bundle.sources) for bundle in self.bundles], dtype=np.int64)
@@ -96,6 +101,19 @@ class Connected:
             synapses={number: one.synapse.definition for number, one in enumerate(bundles) if one.synapse is not None},
             rules={number: [own.rule for own in one.rules] for number, one in enumerate(bundles) if one.rules},
             timed=None if self.exact is None else np.asarray(self.exact.whole() > 0),
+            silent=np.arange(len(self.carriers)) != self.carriers if self.shares else None,
+        )
+
+    @cached_property
+    def carriers(self) -> IntArray:
+        """For each connection the one that carries the states of its synapse: itself, where none is shared."""
+        return np.concatenate(
+            [
+                start + (np.arange(size) if bundle.carriers is None else bundle.carriers)
+                for bundle, size, start in zip(
+                    self.bundles, self.sizes, np.cumsum(self.sizes) - self.sizes, strict=True
+                )
+            ]
         )
 
 

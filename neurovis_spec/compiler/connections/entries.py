@@ -27,6 +27,7 @@ from neurovis_spec.compiler.connections.pair_formulas import At, PairFormulas
 from neurovis_spec.compiler.connections.patterns import all_to_all, drawn_alone, empty_reason, pairs_of, pairs_where
 from neurovis_spec.compiler.connections.plasticity import Learning, rules_of
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
+from neurovis_spec.compiler.connections.shared import carriers_in, check_shared
 from neurovis_spec.compiler.connections.signals import ConnectionEnds, Place
 from neurovis_spec.compiler.connections.spikes import SpikeCheck
 from neurovis_spec.compiler.connections.twins import both_ways, doubled, in_turn, one_of_each
@@ -53,6 +54,7 @@ from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.tables import EdgeFile, FileReference, columns_of_edges, edge_column
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Delay, MatrixRows
+from neurovis_spec.language.words import Combine
 from neurovis_spec.language.yaml.source import Mapping, Scalar
 
 #: Keys of a body that say which connections there are.
@@ -103,6 +105,8 @@ class Bundle(NamedTuple):
     synapse: Settled | None = None
     #: the rules and the synapse, with what they read of both ends
     uses: tuple[InUse, ...] = ()
+    #: where the synapse is shared, for each connection the one of the entry that carries its states; else None
+    carriers: IntArray | None = None
 
     def twinned(self) -> Bundle:
         """The same with each connection directly followed by its twin, which has its numbers."""
@@ -319,7 +323,7 @@ class EntryBuilder:
         if uses is UNKNOWN:
             return UNKNOWN
         parts = *bundle.parts, *(part for use in uses for part in use.parts)
-        return bundle._replace(uses=uses, parts=parts)
+        return bundle._replace(uses=uses, parts=parts, carriers=carriers_in(uses, bundle.targets))
 
     def _once(self, shape: _Shape | Unknown) -> _Shape | Unknown:
         """The pairs of a symmetric entry, each once and none of a neuron with itself. A finding for those that are
@@ -621,7 +625,11 @@ class EntryBuilder:
         return np.ascontiguousarray(grid.values[shape.i, shape.j])
 
     def _measures_distance(self) -> bool | Unknown:
-        """Whether any of the targets combines what arrives by distance; UNKNOWN where it may, since what it says of
+        """Whether any of the targets combines what arrives by distance."""
+        return self._combine_by("distance")
+
+    def _combine_by(self, how: Combine) -> bool | Unknown:
+        """Whether any of the targets combines what arrives in this way; UNKNOWN where it may, since what it says of
         that is invalid."""
         aims = self._aims
         if aims is UNKNOWN or self.route is UNKNOWN:
@@ -629,9 +637,9 @@ class EntryBuilder:
         ports, groups = [name for name, _ in self.route.ports], self.context.census.groups_of(aims)
         declared = (port for one in groups for port in one.kind.model.definition.ports)
         at_drive = [one for one in groups if DRIVE in ports]
-        if any(port.combine == "distance" and port.name in ports for port in declared):
+        if any(port.combine == how and port.name in ports for port in declared):
             return True
-        if any(one.group.combine == "distance" for one in at_drive):
+        if any(one.group.combine == how for one in at_drive):
             return True
         return UNKNOWN if any("combine" in one.model.unknown for one in at_drive) else False
 
@@ -719,6 +727,12 @@ class EntryBuilder:
         settled = settled_of(choice, SYNAPSE, self.context.scope.definitions, self.constants, each, count)
         if settled is UNKNOWN or not settled.sound or not check_initials(settled, choice, self.constants):
             return UNKNOWN
+        if settled.definition.shared:
+            check_shared(settled, choice.name.span, self.constants.findings)
+            if self._combine_by("product") is True:
+                message = "a shared synapse brings the sum of what its connections bring, and a target multiplies that"
+                hint = "let the targets combine by sum, or leave 'shared' out of the synapse"
+                self.constants.findings.error("shared-not-linear", choice.name.span, message, hint)
         return settled
 
     def _uses(self, rules: tuple[Learning, ...], synapse: Settled | None, at: Joined) -> tuple[InUse, ...] | Unknown:

@@ -7,6 +7,7 @@ which numbers of a group follow a formula, a Binding which numbers of an array o
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +34,7 @@ from neurovis_spec.compiler.events.settable import (
 )
 from neurovis_spec.compiler.network import Located, Network
 from neurovis_spec.compiler.neurons.populate import Census
-from neurovis_spec.compiler.program import Key, Owner
+from neurovis_spec.compiler.program import FEED, SYNAPSE, Definition, Key, Owner
 from neurovis_spec.language.expressions.tree import Number
 
 #: Fields that are no numbers of a network: the first weights and centres of what learns, and positions.
@@ -50,13 +51,13 @@ class LocatedPart(NamedTuple):
 
 def found_in(network: Network, census: Census, bundles: tuple[Bundle, ...]) -> Iterator[LocatedPart]:
     """The parts of all of a network: of neurons, connections, and tables of inputs."""
-    neurons, connections = network.located("neuron"), dict[tuple[str, str], Located]()
+    neurons, connections = network.located("neuron"), dict[tuple[str, str, str], Located]()
 
     def at_connections(part: Part) -> Located:
         """Where the definition is in use that a part is of: the parts of some connections may be of several."""
-        key = part.field, part.of
+        key = part.field, part.of, part.name
         if key not in connections:
-            connections[key] = network.located("connection", lambda one: (one.kind.name, one.name) == key)
+            connections[key] = network.located("connection", partial(_has, key))
         return connections[key]
 
     for one in census.groups:
@@ -65,13 +66,22 @@ def found_in(network: Network, census: Census, bundles: tuple[Bundle, ...]) -> I
     start = 0
     for bundle in bundles:
         count = len(bundle.sources)
-        for part in bundle.parts if count else ():
+        parts = bundle.parts if count else ()
+        if bundle.carriers is not None:  # what is shared is of two definitions
+            feeding = (part._replace(field=FEED.name) for part in parts if part.name and part.field == SYNAPSE.name)
+            parts = (*parts, *feeding)
+        for part in parts:
             yield from _found(part, start + part.within(count), at_connections)
         start += count
     for number, entry in enumerate(network.inputs):
         for part in entry.parts:
             assert entry.table is not None
             yield LocatedPart(table_of(number), part.within(entry.table.size), part)
+
+
+def _has(key: tuple[str, str, str], one: Definition) -> bool:
+    """Whether a definition is of a kind and has a name and a parameter."""
+    return (one.kind.name, one.name) == key[:2] and key[2] in one.parameters
 
 
 def _found(part: Part, members: IntArray, locate: Callable[[Part], Located]) -> Iterator[LocatedPart]:
@@ -82,11 +92,11 @@ def _found(part: Part, members: IntArray, locate: Callable[[Part], Located]) -> 
     elif part.name:
         located = locate(part)
         numbers = located.numbers[members]
-        owners = np.flatnonzero(np.bincount(numbers)).tolist()  # np.unique would import numpy.ma
+        owners = np.flatnonzero(np.bincount(numbers + 1)[1:]).tolist()  # np.unique would import numpy.ma
         for number in owners:
             inside = np.flatnonzero(numbers == number)
             array = Key(Owner(part.field, number), part.name)
-            of_owner = part if len(owners) == 1 else part.subset(inside)
+            of_owner = part if len(inside) == len(members) else part.subset(inside)
             yield LocatedPart(array, located.positions[members[inside]], of_owner)
     elif part.field not in _ELSEWHERE:
         yield LocatedPart(Key(None, part.field), members, part)

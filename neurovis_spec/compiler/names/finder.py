@@ -150,7 +150,9 @@ def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
         rules += [_holder(members, learning.rule.name, learning.rule.kept) for learning in bundle.rules]
         if bundle.synapse is not None:
             synapse = bundle.synapse.definition
-            synapses.append(_holder(members, synapse.name, synapse.state)._replace(outputs=(SYNAPSE.gives,)))
+            carriers = None if bundle.carriers is None else first + bundle.carriers
+            holder = _holder(members, synapse.name, synapse.state)
+            synapses.append(holder._replace(outputs=(SYNAPSE.gives,), carriers=carriers))
     names = tuple(bundle.name for bundle in made.bundles)
     empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
     ends = made.sources.compact(), made.targets.compact()

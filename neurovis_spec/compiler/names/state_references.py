@@ -59,12 +59,21 @@ class Refusal(NamedTuple):
 
 class Holder(NamedTuple):
     """Members (neurons, or connections) whose model, rule or synapse is ``kind`` and has these states, and these
-    outputs beside them, where outputs are asked for, too; a synapse's is its signal."""
+    outputs beside them, where outputs are asked for, too; a synapse's is its signal. ``carriers``: of connections that
+    share their states which of them has those of each, by whose name they go; None where each has its own."""
 
     members: IntArray
     kind: str
     states: tuple[str, ...]
     outputs: tuple[str, ...] = ()
+    carriers: IntArray | None = None
+
+    def having(self, state: str, connections: IntArray) -> IntArray:
+        """The connections that have this state, or this output, of some connections."""
+        own = np.isin(self.members, connections)
+        if self.carriers is not None and state in self.states:
+            return np.unique(self.carriers[own])
+        return self.members[own]
 
 
 class Wiring(NamedTuple):
@@ -114,10 +123,12 @@ def connections_state(
     )
     holders = (*rules, *synapses)
     having = [
-        holder.members for holder in holders if name.state in (*holder.states, *(holder.outputs if outputs else ()))
+        holder.having(name.state, connections)
+        for holder in holders
+        if name.state in (*holder.states, *(holder.outputs if outputs else ()))
     ]
     if having:
-        return StateOf.of("connection", name.state, connections[np.isin(connections, np.concatenate(having))])
+        return StateOf.of("connection", name.state, np.sort(np.concatenate(having)))
     if not wiring.complete:
         return UNKNOWN
     if not len(connections):

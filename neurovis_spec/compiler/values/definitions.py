@@ -42,6 +42,7 @@ from neurovis_spec.compiler.values.constants import (
     parse_formula,
     value_of,
 )
+from neurovis_spec.compiler.values.shared import obstacles
 from neurovis_spec.compiler.values.spikes import Spike, jumping, share_of, with_spike
 from neurovis_spec.diagnostics import Findings, Home, Span, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
@@ -204,7 +205,7 @@ class _Checker:
     ) -> None:
         self.model = model
         self.parts = model.parts()
-        self.findings = findings
+        self.findings, self.errors_before = findings, findings.errors
         self.functions = dict.fromkeys(reading.role.functions, 1)
         self.constants = {**CONSTANTS, "dt": around.dt * _PER_SECOND[self.parts.time]}
         self.outside = around.outside
@@ -260,6 +261,17 @@ class _Checker:
         if isinstance(first, Span):
             return f"'{name}' already means something here (it is declared in line {first.line})"
         return f"'{name}' already means something here: {meaning(name)}"
+
+    def sharing(self, definition: Definition) -> None:
+        """Report what keeps the states of a synapse from being shared, where all else of it is in order."""
+        if not definition.shared or self.findings.errors > self.errors_before:
+            return
+        for state, key, message, hint in obstacles(definition):
+            within = self.model.source.get("state") if state else None
+            source = within.get(state) if isinstance(within, SourceMapping) else self.model.source
+            node = source.get(key) if isinstance(source, SourceMapping) else source
+            span = self.model.source.span if node is None else node.span
+            self.findings.error("shared-not-linear", span, message, hint)
 
     def _key(self, section: str, name: str) -> Span:
         return _key_in(self.model.source, section, name)
@@ -637,8 +649,10 @@ def definition_of(
         units=tuple((name, one.unit.value) for name, one in parts.parameters.items() if one.unit is not None),
         sign=checker.sign(parts.sign, defaults),
         fires=spike is not None,
+        shared=parts.shared,
     )
     checker.no_spikes(definition)
+    checker.sharing(definition)
     return Defined(definition, defaults)
 
 
