@@ -7,11 +7,13 @@ of the network, and lies where its files are.
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from collections.abc import Iterable, Mapping
+from io import StringIO
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Annotated, Final, TypeAlias
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -20,15 +22,24 @@ from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.connections.edges import EdgeColumns
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.edge_list import EdgeTable
-from neurovis_spec.language.data.files import NamedFile, read_edges, read_table
-from neurovis_spec.language.located import Located
+from neurovis_spec.language.data.files import NamedFile, read_edges, read_sheet, read_table
+from neurovis_spec.language.located import Leaf, Located
 from neurovis_spec.language.modules import INCLUDED
 from neurovis_spec.language.spec import Spec
-from neurovis_spec.language.tables import EdgeFile, EdgesField, columns_of_edges, edge_column
+from neurovis_spec.language.tables import (
+    WHERE,
+    Condition,
+    EdgeFile,
+    EdgesField,
+    as_where,
+    columns_of_edges,
+    edge_column,
+)
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, one_or_more
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
+_WHERE: Final = TypeAdapter(Annotated[tuple[Condition, ...], Leaf(as_where, WHERE.shape)])
 _EDGES: Final[TypeAdapter[object]] = TypeAdapter(EdgesField)
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 
@@ -93,6 +104,8 @@ class _Reader:
     def value(self, node: Node, folder: Path, path: tuple[str, ...]) -> Plain:
         """Any node."""
         if isinstance(node, SourceMapping):
+            if path[-1:] not in (("edges",), ("spikes",)) and node.get("file") is not None and _has_columns(node):
+                return self._inline(node, folder)
             if path and path[-1] in ("matrix", "centre", "position") and node.get("file") is not None:
                 return self._table(node, folder)
             if path and path[-1] == "edges" and node.get("file") is not None:
@@ -122,6 +135,20 @@ class _Reader:
             for row, present in zip(table.values.tolist(), table.present.tolist(), strict=True)
         ]
 
+    def _inline(self, node: SourceMapping, folder: Path) -> Plain:
+        """What stands in a table, with what is read of it as a text."""
+        where = _WHERE.validate_python(node.get("where"), context=self._findings)
+        sheet = read_sheet(self._named(node, folder), where, self._findings)
+        used = [one for key in ("column", "columns", "by") if (found := node.get(key)) for one in one_or_more(found)]
+        names = {str(one.value): Located(str(one.value), one) for one in used if isinstance(one, Scalar)}
+        rest = {e.name: self.value(e.value, folder, ()) for e in node.entries if e.name not in ("file", "key", "where")}
+        if sheet is UNKNOWN:
+            return None
+        text = StringIO()
+        columns = [sheet.texts(name) for name in names.values()]
+        csv.writer(text, lineterminator="\n").writerows([[*names], *zip(*columns, strict=True)])
+        return {"csv": text.getvalue(), **rest}
+
     def _edges(self, node: SourceMapping, folder: Path) -> Plain:
         edges = self._read_edges(node, folder)
         return None if edges is UNKNOWN else list(_rows(edges))
@@ -142,6 +169,10 @@ class _Reader:
         more = [name for one in settings if isinstance(one, SourceMapping) for name in columns_of_edges(one)]
         table = self._read_edges(edges, folder, tuple({name.value: name for name in more}.values()))
         return None if table is UNKNOWN else EdgeColumns.of(table)
+
+
+def _has_columns(node: SourceMapping) -> bool:
+    return node.get("column") is not None or node.get("columns") is not None
 
 
 def _rows(edges: EdgeTable) -> Iterable[Plain]:

@@ -45,6 +45,8 @@ def folder(tmp_path: Path) -> Path:
     np.savetxt(data / "centres.csv", np.eye(2, 4), delimiter=",")
     np.savez_compressed(data / "trained.npz", weights=np.ones((2, 4)), bias=np.zeros(4))
     (data / "feedback.mtx").write_text("%%MatrixMarket matrix coordinate pattern general\n4 2 2\n1 1\n4 2\n")
+    cells = "name,class,x,y,leak,bias\nP,inner,0,0,0.2,1\nQ,extra,1,0,,2\n"
+    (data / "cells.csv").write_text(cells, encoding="utf-8")
     worm = "Source\tTarget\tType\tN\tdelay_ms\trate\nAVAL\tAVAR\tchemical\t3\t1\t\nAVAR\tAVBL\tgap\t1\t\t\n"
     (data / "worm.tsv").write_text(worm, encoding="utf-8")
     (data / "edges.csv").write_text("from,to,weight,delay\nK1,O,0.5,1\nK2,O,,2\n", encoding="utf-8")

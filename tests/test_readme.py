@@ -26,6 +26,7 @@ PAGES = [
         "docs/language.md",
         "docs/measures.md",
         "docs/ros.md",
+        "docs/tables.md",
     )
 ]
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import re
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -14,6 +18,7 @@ from small_specs import HEAD, answer, codes, compiled, network_of, wires
 import neurovis_spec as nv
 from neurovis_spec.cli.overview import overview
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.language.data import sheet
 from neurovis_spec.language.data.cells import separator_of
 from neurovis_spec.language.data.edge_list import parse_edges
 from neurovis_spec.language.located import Located
@@ -165,3 +170,168 @@ def test_inspect_says_what_was_found_by_looking(tmp_path: Path) -> None:
         "worm.tsv": "separated by tabs, 3 of 4 rows",
     }
     assert "files\n  worm.tsv  separated by tabs, 3 of 4 rows" in overview(compiled(text, tmp_path))
+
+
+#: A row a neuron, as it comes out of a spreadsheet; not in the order of the neurons, and with others among them.
+SHEET = """\
+cell;x;y;leak;start;offset;what
+K2;1;0;0.5;;-1;two
+K1;0;0;0.25;0.1;-2;one
+other;9;9;9;9;9;else
+"""
+
+
+def test_settings_from_a_table(tmp_path: Path) -> None:
+    (tmp_path / "cells.csv").write_text(SHEET)
+    by = "file: cells.csv, by: cell"
+    text = (
+        f"neurons: {{K: {{count: 2, model: {{leaky_integrator: {{leak: {{{by}, column: leak}}}}}}, "
+        f"bias: {{{by}, column: offset}}, initial: {{v: {{{by}, column: start, default: 7}}}}, "
+        f"activation: {{gaussian: {{sigma: {{{by}, column: leak}}}}}}, position: {{{by}, columns: [x, y]}}}}}}"
+    )
+    network = compiled(text, tmp_path)
+    neurons = network.network.neurons
+    assert neurons.groups[0].model_parameters == {"leak": (0.25, 0.5)}
+    assert neurons.groups[0].activation_parameters == {"sigma": (0.25, 0.5)}
+    assert neurons.bias.tolist() == [-2, -1]
+    assert neurons.position.tolist() == [[0, 0], [1, 0]]
+    assert nv.compile_text(network.text()).hash == network.hash
+    by_hand = "model: {leaky_integrator: {leak: [0.25, 0.5]}}, bias: [-2, -1], initial: {v: [0.1, 7]}, "
+    by_hand += "activation: {gaussian: {sigma: [0.25, 0.5]}}, position: [[0, 0], [1, 0]]"
+    assert compiled(f"neurons: {{K: {{count: 2, {by_hand}}}}}").hash == network.hash
+
+
+def test_rows_are_in_the_order_of_the_neurons_where_nothing_else_is_said(tmp_path: Path) -> None:
+    (tmp_path / "cells.txt").write_text("kind value\nbig   1\nsmall 2\nbig   3\n")
+    column = "file: cells.txt, column: value"
+    assert network_of(f"neurons: {{K: {{count: 3, bias: {{{column}}}}}}}", tmp_path).neurons.bias.tolist() == [1, 2, 3]
+    some = f"neurons: {{K: {{count: 2, bias: {{{column}, where: {{kind: big}}}}}}}}"
+    assert network_of(some, tmp_path).neurons.bias.tolist() == [1, 3]
+    code, message, hint = answer(f"neurons: {{K: {{count: 2, bias: {{{column}}}}}}}", tmp_path)
+    assert (code, message) == ("wrong-size", "the table has 3 rows, and there are 2 neurons")
+    assert "by: COLUMN" in hint
+
+
+def test_rows_of_instances_by_their_whole_names_or_those_of_their_scope(tmp_path: Path) -> None:
+    (tmp_path / "cells.csv").write_text("name,bias\nA,1\nleft2.A,2\n")
+    text = "modules: {leg: {neurons: {A: {bias: {file: cells.csv, by: name, column: bias}}}}}\n"
+    network = network_of(text + "instances: {left: {module: leg, count: 3}}", tmp_path)
+    assert network.neurons.bias.tolist() == [1, 2, 1]
+
+
+@pytest.mark.parametrize(
+    ("setting", "code", "message", "hint"),
+    [
+        ("file: c.csv, by: cell, column: lek", "file-format", "no column 'lek'", "did you mean 'leak'?"),
+        ("file: c.csv, by: sell, column: leak", "file-format", "no column 'sell'", "did you mean 'cell'?"),
+        ("file: c.csv, by: cell, column: start", "file-format", "row 2, column 5 of the table is empty", "'default'"),
+        ("file: c.csv, by: what, column: leak", "file-format", "no row of the table is of 'K1'", "there are"),
+        ("file: c.csv, by: cell, column: what", "file-format", "row 2, column 7: 'two' is no number", ""),
+        ("file: c.csv, column: leak, default: many", "wrong-type", "a default is a number", ""),
+        ("column: leak", "missing-key", "the key 'file' is missing", "write"),
+        ("file: c.csv", "missing-key", "the key 'column' is missing", "write {file: PATH, column: NAME}"),
+        ("file: c.csv, by: cell, colum: leak", "unknown-key", "unknown key 'colum'", "did you mean 'column'?"),
+        ("file: c.mtx, column: leak", "file-format", "no kind of file whose columns have names", "known: .csv"),
+        ("file: c.csv, key: x, column: leak", "useless-key", "'key' names an array", ""),
+        ("file: twice.csv, by: cell, column: leak", "file-format", "rows 2 and 4 of the table are both of 'K1'", ""),
+        ("file: ragged.csv, column: leak", "file-format", "row 3 has 1 cell, the header 2", ""),
+        ("file: none.csv, column: leak", "file-missing", "does not exist", ""),
+        ("file: c.csv, by: cell, column: leak, where: {what: three}", "file-format", "no row has 'three'", ""),
+    ],
+)  # fmt: skip
+def test_settings_that_no_table_has(tmp_path: Path, setting: str, code: str, message: str, hint: str) -> None:
+    (tmp_path / "c.csv").write_text(SHEET)
+    (tmp_path / "twice.csv").write_text("cell,leak\nK1,1\nK2,2\nK1,3\n")
+    (tmp_path / "ragged.csv").write_text("cell,leak\nK1,1\nK2\n")
+    for group in (f"bias: {{{setting}}}", f"model: {{leaky_integrator: {{leak: {{{setting}}}}}}}"):
+        with pytest.raises(nv.SpecError) as caught:
+            compiled(f"neurons: {{K: {{count: 2, {group}}}}}", tmp_path)
+        first = caught.value.diagnostics[0]
+        assert first.code == code
+        assert message in first.message
+        assert hint in (first.hint or "")
+
+
+def test_names_labels_and_boxes_from_a_table(tmp_path: Path) -> None:
+    (tmp_path / "cells.csv").write_text(
+        "name,title,part,kind\nAVAL,left command,head,inter\nPVCR,,tail,inter\nM1,motor {1},,motor\n"
+    )
+    column = "file: cells.csv, where: {kind: [inter, motor]}"
+    text = (
+        f"neurons: {{C: {{names: {{{column}, column: name}}, label: {{{column}, column: title, default: '?'}}, "
+        f"bias: 1, box: {{{column}, by: name, column: part}}}}}}\nconnections: {{AVAL -> M1: 1}}"
+    )
+    network = compiled(text, tmp_path)
+    assert network.network.neurons.names == ("AVAL", "PVCR", "M1")
+    assert network.network.neurons.labels == ("left command", "?", "motor {1}")
+    assert network.network.layout.boxes == (("head", (0,)), ("tail", (1,)))
+    again = nv.compile_text(network.text())
+    assert again.hash == network.hash
+    assert again.network.layout.boxes == network.network.layout.boxes
+    assert again.network.neurons.labels == network.network.neurons.labels
+    network.render(tmp_path / "a.svg")
+    drawn = (tmp_path / "a.svg").read_text()
+    assert "tail" in drawn
+    assert "left command" in drawn
+
+
+def test_the_neurons_of_a_table_are_those_of_its_rows(tmp_path: Path) -> None:
+    (tmp_path / "c.csv").write_text("name\nK1\nK-2\nK1\n\nK5\n")
+    text = "neurons: {C: {%snames: {file: c.csv, column: name}}}"
+    with pytest.raises(nv.SpecError) as caught:
+        compiled(text % "", tmp_path)
+    assert [(one.code, one.message) for one in caught.value.diagnostics] == [
+        ("file-format", "row 5, column 1 of the table is empty"),
+    ]
+    (tmp_path / "c.csv").write_text("name\nK1\nK-2\nK1\n")
+    with pytest.raises(nv.SpecError) as caught:
+        compiled(text % "", tmp_path)
+    assert [(one.code, one.message) for one in caught.value.diagnostics] == [
+        ("bad-name", "row 3 of the table: 'K-2' is not a name"),
+        ("duplicate-neuron", "row 4 of the table: 'K1' is named before (row 2)"),
+    ]
+    (tmp_path / "c.csv").write_text("name\nK1\nK2\n")
+    assert answer(text % "count: 3, ", tmp_path)[1] == "'names' has 2 names, 'count' says 3"
+    assert codes(text.replace("column: name", "column: name, by: name") % "", tmp_path) == ["unknown-key"]
+
+
+RECIPES = re.split(r"^## ", (Path(__file__).parents[1] / "docs" / "tables.md").read_text(encoding="utf-8"), flags=re.M)
+
+
+@pytest.mark.parametrize("recipe", RECIPES[1:], ids=lambda text: text.partition("\n")[0])
+def test_a_recipe_is_right(recipe: str, tmp_path: Path) -> None:
+    for name, text in re.findall(r"^`(\S+)`:\n\n```\n(.*?)^```$", recipe, re.M | re.S):
+        (tmp_path / name).write_text(text)
+    specs = re.findall(r"^```yaml\n(.*?)^```$", recipe, re.M | re.S)
+    assert specs
+    for spec in specs:
+        network = compiled(spec, tmp_path)
+        assert network.warnings == ()
+        network.run(3)
+        if "spikes:" not in spec:
+            assert nv.compile_text(network.text()).hash == network.hash
+
+
+def test_a_file_is_at_fault_once(tmp_path: Path) -> None:
+    (tmp_path / "c.csv").write_text("cell,leak\nK1,x\nK2,2\n")
+    column = "{file: c.csv, column: leak}"
+    text = f"neurons: {{K: {{count: 2, bias: {column}, initial: {column}}}, L: {{count: 2, bias: {column}}}}}"
+    assert codes(text, tmp_path) == ["file-format"]
+
+
+@given(
+    st.lists(
+        st.tuples(st.text(alphabet='ab";, \n', max_size=5), st.sampled_from(["1", "-2.5", "", "7e3"])),
+        min_size=1,
+        max_size=9,
+    ),
+    st.booleans(),
+)
+def test_a_sheet_holds_what_was_written(rows: list[tuple[str, str]], windows: bool) -> None:  # fmt: skip
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n" if windows else "\n")
+    writer.writerows([("text", "number"), *rows])
+    with patch.object(sheet, "_STRETCH", 16):
+        got = sheet.parse_sheet(text.getvalue().encode(), "a.csv")
+    assert got.texts(located("text")) == tuple(" ".join(row[0].split("\n")).strip() for row in rows)
+    np.testing.assert_array_equal(got.numbers(located("number")), [float(row[1] or "nan") for row in rows])

@@ -30,6 +30,7 @@ from neurovis_spec.language.grammar import (
     SENT,
     SETTABLE,
     TEXT,
+    TEXTS,
     TWO,
     WHICH,
     AsTable,
@@ -44,15 +45,16 @@ from neurovis_spec.language.grammar import (
 from neurovis_spec.language.keys import apart, mend_torn
 from neurovis_spec.language.located import (
     IDENTIFIER,
+    NAME,
     BoolField,
     FormulaField,
     Leaf,
     Located,
-    NamesField,
     PartsField,
     TextField,
-    TextsField,
     TimeField,
+    as_text,
+    as_texts,
     findings_of,
     items_of,
     refuse,
@@ -61,7 +63,20 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Filled, Keyed, Model, Named, Short, entry_hint
 from neurovis_spec.language.patterns import PATTERNS, PatternField
-from neurovis_spec.language.tables import FILE, EdgesField, FileReference, as_file
+from neurovis_spec.language.tables import (
+    FILE,
+    NAMES,
+    PLACES,
+    WORDS,
+    EdgesField,
+    FileReference,
+    TableColumn,
+    as_file,
+    as_names_column,
+    as_places_column,
+    as_words_column,
+    is_from_table,
+)
 from neurovis_spec.language.units import TIME_ABOUTS, TIMES
 from neurovis_spec.language.values import (
     ActivationField,
@@ -217,11 +232,31 @@ class InputModel(Model):
 InputsField = Annotated[Named[InputModel], declaring("input")]
 
 
-def _position(node: Node, info: ValidationInfo) -> FileReference | AnyList:
+def _position(node: Node, info: ValidationInfo) -> FileReference | TableColumn | AnyList:
+    if isinstance(node, Mapping) and any(node.entry(key) is not None for key in ("columns", "by", "where")):
+        return as_places_column(node, info)
     if isinstance(node, Mapping):
         return as_file(node, info)
     wanted = "a position [x, y], a list of them, or {file: …}"
     return node if isinstance(node, AnyList) else refuse(info, node, wanted)
+
+
+def _neuron_names(node: Node, info: ValidationInfo) -> tuple[Located[str], ...] | TableColumn:
+    return as_names_column(node, info) if is_from_table(node) else as_texts(node, info)
+
+
+def _labels(node: Node, info: ValidationInfo) -> tuple[Located[str], ...] | TableColumn:
+    return as_words_column(node, info) if is_from_table(node) else as_texts(node, info)
+
+
+def _box(node: Node, info: ValidationInfo) -> Located[str] | TableColumn:
+    return as_words_column(node, info) if is_from_table(node) else as_text(node, info)
+
+
+NeuronNames = Annotated[
+    tuple[Located[str], ...] | TableColumn, Leaf(_neuron_names, Either((NAME, ListOf(NAME), NAMES)))
+]
+LabelsField = Annotated[tuple[Located[str], ...] | TableColumn, Leaf(_labels, Either((TEXTS, WORDS)))]
 
 
 def _as_input(node: Node, info: ValidationInfo) -> Located[str]:
@@ -252,8 +287,8 @@ class GroupModel(Model):
     first: Annotated[
         FormulaField | None, Needs(("count", "names"), "'first' needs 'count'", code="first-without-count")
     ] = Field(None, description="The number of the first neuron (default 1).")
-    names: Annotated[NamesField, declaring("neuron")] | None = Field(
-        None, description="The names of the neurons, one by one."
+    names: Annotated[NeuronNames, declaring("neuron")] | None = Field(
+        None, description="The names of the neurons, one by one, or {file: …, column: …}."
     )
     activation: ActivationField | None = Field(
         None, description="Activation function, name or {name: {parameter: value}} (default identity)."
@@ -280,13 +315,19 @@ class GroupModel(Model):
         None,
         description="A formula with normal, uniform or poisson, drawn anew and added each step; or by ports.",
     )
-    position: Annotated[FileReference | AnyList | None, Leaf(_position, Either((TWO, ListOf(TWO), FILE))), GROUP] = (
-        Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")
+    position: Annotated[
+        FileReference | TableColumn | AnyList | None,
+        Leaf(_position, Either((TWO, ListOf(TWO), FILE, PLACES))),
+        GROUP,
+    ] = Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")
+    label: Annotated[LabelsField, LABEL] | None = Field(
+        None,
+        description="Display text; a counted group may give a list, or {file: …, column: …}. May hold expressions: "
+        "'d{number}'.",
     )
-    label: Annotated[TextsField, LABEL] | None = Field(
-        None, description="Display text; a counted group may give a list. May hold expressions: 'd{number}'."
+    box: Annotated[Located[str] | TableColumn, Leaf(_box, Either((TEXT, WORDS)))] | None = Field(
+        None, description="The named box of the picture that holds the group; or {file: …, column: …}, one each."
     )
-    box: TextField | None = Field(None, description="The named box of the picture that holds the group.")
     role: Annotated[Located[NeuronRole], words(NeuronRole)] | None = Field(
         None, description="What the picture and the layout take it for: input, hidden or output."
     )

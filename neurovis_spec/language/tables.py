@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from typing import Annotated, Final, NamedTuple, TypeGuard
 
-from pydantic import ValidationInfo
+from pydantic import TypeAdapter, ValidationError, ValidationInfo
 
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.grammar import (
@@ -52,30 +52,38 @@ FILE: Final = Map(
 
 
 class FileReference(NamedTuple):
-    """``{file: path}``; ``key`` names the array of an archive."""
+    """``{file: path}``; ``key`` names the array of an archive. ``inline``: the path is no path but the text itself."""
 
     path: Located[str]
     key: Located[str] | None
     span: Span
+    inline: bool = False
 
 
 #: How the names of files end that hold a table of numbers.
 DATA_FILES: Final = (".csv", ".npy", ".npz", ".mtx")
 #: How those of text end whose cells something separates.
 TEXT_FILES: Final = (".csv", ".tsv", ".txt", ".dat")
+#: How those end whose columns have names.
+TABLE_FILES: Final = TEXT_FILES
 
 
 def file_and_keys(node: Mapping, shape: Map, info: ValidationInfo) -> tuple[FileReference, Mapping]:
     """The file of a mapping of this shape, and the mapping with its keys as they are meant."""
     keys = read_keys(node, shape.known, findings_of(info))
     node = keys.mapping
-    path = node.get("file")
-    if path is None:
+    inline = node.get("csv") if "csv" in shape.known else None
+    path, key = node.get("file"), node.get("key")
+    if path is not None and inline is not None:
+        message = "'csv' beside 'file': values stand in one table"
+        findings_of(info).error("conflicting-keys", inline.span, message, "remove one of them")
+        give_up()
+    if path is None and inline is None:
         if keys.lack("file"):
             findings_of(info).error("missing-key", opening(node), "the key 'file' is missing", "write {file: PATH}")
         give_up()
-    key = node.get("key")
-    return FileReference(as_text(path, info), None if key is None else as_text(key, info), node.span), node
+    text = as_text(path or inline or node, info)
+    return FileReference(text, None if key is None else as_text(key, info), node.span, inline is not None), node
 
 
 def as_file(node: Mapping, info: ValidationInfo) -> FileReference:
@@ -253,9 +261,116 @@ OF_EDGES: Final = Map(
 EdgesField = Annotated[EdgeRows | EdgeFile, Leaf(as_edges, Either((ListOf(_EDGE), _EDGE_FILE)))]
 
 
+class TableColumn(NamedTuple):
+    """Values in columns of a file, one row a neuron: in order, or those that a column ``by`` names. ``default`` is what
+    takes the place of an empty cell and of a row that is missing."""
+
+    file: FileReference
+    columns: tuple[Located[str], ...]
+    by: Located[str] | None
+    default: Node | None
+    where: tuple[Condition, ...]
+    span: Span
+
+
+_COMMON: Final = {
+    "file": Key(UNNAMED, "A file, by its path relative to this one."),
+    "csv": Key(UNNAMED, "The table itself, as a text, in place of a file."),
+    "key": FILE.known["key"],
+    "by": Key(UNNAMED, "The column of the neurons' names, by which rows are found; without it they are in order."),
+    "where": WHERE,
+}
+_COLUMN: Final = Key(UNNAMED, "The column of the values.", required=True)
+#: A number for each neuron, a text for each, a position for each.
+NUMBERS: Final = Map(
+    {
+        **_COMMON,
+        "column": _COLUMN,
+        "default": Key(NUMBER, "What an empty cell is, and what a neuron has that no row names."),
+    }
+)
+WORDS: Final = Map(
+    {
+        **_COMMON,
+        "column": _COLUMN,
+        "default": Key(UNNAMED, "What an empty cell is, and what a neuron has that no row names."),
+    }
+)
+#: The rows themselves are the neurons then.
+NAMES: Final = Map({**{key: value for key, value in _COMMON.items() if key != "by"}, "column": _COLUMN})
+PLACES: Final = Map(
+    {
+        **_COMMON,
+        "columns": Key(ListOf(UNNAMED, least=2, most=2), "The columns of x and y.", required=True),
+    }
+)
+
+
+def _as_column(node: Mapping, shape: Map, info: ValidationInfo) -> TableColumn:
+    """What a mapping of this shape says."""
+    file, keys = file_and_keys(node, shape, info)
+    where, by, default = as_where(keys.get("where"), info), keys.get("by"), keys.get("default")
+    several = "columns" in shape.known
+    written = keys.get("columns" if several else "column")
+    if written is None:
+        if keys.entry("column") is None:
+            hint = "write {file: PATH, columns: [x, y]}" if several else "write {file: PATH, column: NAME}"
+            name = "columns" if several else "column"
+            findings_of(info).error("missing-key", opening(node), f"the key '{name}' is missing", hint)
+        give_up()
+    if several and (not isinstance(written, AnyList) or len(written) != _DIMENSIONS):
+        flat = "positions are in a plane" if isinstance(written, AnyList) and len(written) > _DIMENSIONS else None
+        refuse(info, written, "the columns of x and y", flat)
+    columns = each(one_or_more(written), as_text, info)
+    if default is not None and not isinstance(default, Scalar):
+        refuse(info, default, "a number or a text")
+    return TableColumn(file, columns, None if by is None else as_text(by, info), default, where, node.span)
+
+
+#: How many numbers a position has.
+_DIMENSIONS: Final = 2
+
+
+def as_numbers_column(node: Mapping, info: ValidationInfo) -> TableColumn:
+    """``{file: PATH, column: NAME}``, with a number for each neuron."""
+    column = _as_column(node, NUMBERS, info)
+    if column.default is not None and number_of_default(column.default, findings_of(info)) is UNKNOWN:
+        give_up()
+    return column
+
+
+def as_words_column(node: Mapping, info: ValidationInfo) -> TableColumn:
+    """The same with a text for each."""
+    column = _as_column(node, WORDS, info)
+    if column.default is not None:
+        as_text(column.default, info)
+    return column
+
+
+def as_names_column(node: Mapping, info: ValidationInfo) -> TableColumn:
+    """The same with the name of a neuron in each row that counts."""
+    return _as_column(node, NAMES, info)
+
+
+def as_places_column(node: Mapping, info: ValidationInfo) -> TableColumn:
+    """``{file: PATH, columns: [x, y]}``, with a position for each."""
+    return _as_column(node, PLACES, info)
+
+
+_NUMBERS: Final[TypeAdapter[TableColumn]] = TypeAdapter(Annotated[TableColumn, Leaf(as_numbers_column, NUMBERS)])
+
+
+def numbers_column(node: Mapping, findings: Findings) -> TableColumn | Unknown:
+    """What a setting says that stands in a table; UNKNOWN where it is invalid, which is reported."""
+    try:
+        return _NUMBERS.validate_python(node, context=findings)
+    except ValidationError:
+        return UNKNOWN
+
+
 def is_from_table(node: Node) -> TypeGuard[Mapping]:
     """Whether a value is one of a table."""
-    return isinstance(node, Mapping) and any(node.entry(key) is not None for key in ("column", "file"))
+    return isinstance(node, Mapping) and any(node.entry(key) is not None for key in ("column", "file", "csv"))
 
 
 class EdgeColumn(NamedTuple):
@@ -284,8 +399,9 @@ def edge_column(node: Mapping, findings: Findings) -> EdgeColumn | Unknown:
 def number_of_default(node: Node, findings: Findings) -> float | Unknown:
     """What takes the place of what a table has not: a number."""
     formula = formula_of(node, findings)
-    if formula is UNKNOWN or isinstance(formula.value, (int, float)):
-        return UNKNOWN if formula is UNKNOWN else float(formula.value)
+    value = UNKNOWN if formula is UNKNOWN else formula.value
+    if not isinstance(value, str):
+        return value if value is UNKNOWN else float(value)
     findings.error("wrong-type", node.span, "a default is a number, no expression")
     return UNKNOWN
 

@@ -61,7 +61,18 @@ from neurovis_spec.language.located import (
     value_or,
 )
 from neurovis_spec.language.model import Model, NamedParameters, Short
-from neurovis_spec.language.tables import CELL_OF_ROWS, FILE, OF_EDGES, FileReference, as_file, file_hint
+from neurovis_spec.language.tables import (
+    CELL_OF_ROWS,
+    FILE,
+    NUMBERS,
+    OF_EDGES,
+    FileReference,
+    TableColumn,
+    as_file,
+    as_numbers_column,
+    file_hint,
+    is_from_table,
+)
 from neurovis_spec.language.units import Seconds, measured
 from neurovis_spec.language.words import Combine
 from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, Sequence, one_or_more
@@ -139,8 +150,10 @@ def _of_sources(value: Role) -> Map:
     return Map({FROM: Key(Either((name, ListOf(name))), "What has one value for each source.", True)}, one=True)
 
 
-ActivationField = Annotated[Choice, Leaf(as_choice, _choice("activation", GROUP)), Role("choice", "activation")]
-ModelField = Annotated[Choice, Leaf(as_choice, _choice("model", GROUP)), Role("choice", "model")]
+ActivationField = Annotated[
+    Choice, Leaf(as_choice, _choice("activation", GROUP, NUMBERS)), Role("choice", "activation")
+]
+ModelField = Annotated[Choice, Leaf(as_choice, _choice("model", GROUP, NUMBERS)), Role("choice", "model")]
 SynapseField = Annotated[
     Choice, Leaf(as_choice, _choice("synapse", SYNAPSE_SETTING, OF_EDGES)), Role("choice", "synapse")
 ]
@@ -252,6 +265,16 @@ class FormulaList(NamedTuple):
     span: Span
 
 
+#: What gives a number to each neuron.
+Values: TypeAlias = Formula | FormulaList | TableColumn
+VALUES: Final = Either((FORMULA, ListOf(FORMULA), NUMBERS))
+
+
+def as_values(node: Node, info: ValidationInfo) -> Values:
+    """Formulas that may have units, or a column of a table."""
+    return as_numbers_column(node, info) if is_from_table(node) else as_all_measured(node, info)
+
+
 def as_formulas(node: Node, info: ValidationInfo) -> Formula | FormulaList:
     """A formula, or a list with one for each neuron."""
     if isinstance(node, AnyList):
@@ -271,8 +294,10 @@ def as_feed(node: Node, info: ValidationInfo) -> Formula | FormulaList | None:
     return None if isinstance(node, Scalar) and node.value is None else as_formulas(node, info)
 
 
-def all_in_unit(formulas: Formula | FormulaList, unit: str, findings: Findings) -> Formula | FormulaList:
-    """The same with numbers with a unit in this one, if it is any (``in_unit``)."""
+def all_in_unit(formulas: Values, unit: str, findings: Findings) -> Values:
+    """The same with numbers with a unit in this one, if it is any (``in_unit``); those of a table have none."""
+    if isinstance(formulas, TableColumn):
+        return formulas
     if isinstance(formulas, FormulaList):
         return FormulaList(tuple(in_unit(item, unit, findings) for item in formulas.items), formulas.span)
     return in_unit(formulas, unit, findings)
@@ -281,17 +306,19 @@ def all_in_unit(formulas: Formula | FormulaList, unit: str, findings: Findings) 
 class Initial(NamedTuple):
     """What a group begins with: its activity at step 0 (None: it is computed), and states of its model."""
 
-    activity: Formula | FormulaList | None
-    states: tuple[tuple[Located[str], Formula | FormulaList], ...] = ()
+    activity: Values | None
+    states: tuple[tuple[Located[str], Values], ...] = ()
 
 
 def as_initial(node: Node, info: ValidationInfo) -> Initial:
     """The activity, or a mapping of states and ``activity``."""
+    if is_from_table(node):
+        return Initial(as_numbers_column(node, info))
     if not isinstance(node, Mapping):
         return Initial(as_formulas(node, info))
     if not node.entries:
         refuse(info, node, "a value, or states with their values", "write {activity: 0.5}")
-    found = {entry.name: (Located(entry.name, entry.key), as_all_measured(entry.value, info)) for entry in node.entries}
+    found = {entry.name: (Located(entry.name, entry.key), as_values(entry.value, info)) for entry in node.entries}
     _, activity = found.pop(ACTIVITY, (None, None))
     return Initial(activity, tuple(found.values()))
 
@@ -299,15 +326,15 @@ def as_initial(node: Node, info: ValidationInfo) -> Initial:
 #: What stands beside the states of a model in ``initial``.
 ACTIVITY = "activity"
 _STATES: Final = Map(
-    {ACTIVITY: Key(FORMULAS, "The activity at step 0; without it step 0 is computed.")},
-    FORMULAS,
+    {ACTIVITY: Key(VALUES, "The activity at step 0; without it step 0 is computed.")},
+    VALUES,
     Role("state", "model"),
     least=1,
 )
 #: What an event sets: a parameter or weights to a formula, weights to one number each, too.
 SetField = Annotated[Formula | FormulaList, Leaf(as_all_measured, FORMULAS, True)]
 FeedField = Annotated[Formula | FormulaList | None, Leaf(as_feed, Either((FORMULA, ListOf(FORMULA), NULL)), True)]
-InitialField = Annotated[Initial, Leaf(as_initial, Either((FORMULA, ListOf(FORMULA), _STATES)))]
+InitialField = Annotated[Initial, Leaf(as_initial, Either((VALUES, _STATES)))]
 
 
 DelayField = Annotated[Delay, Leaf(as_delay, Either((FORMULA, _DELAY)))]
@@ -350,7 +377,8 @@ DestinationsField = Annotated[
     Leaf(as_destinations, Either((Plain(TEXT.written, PORT), Map({}, FORMULA, PORT, least=1)))),
 ]
 BiasField = Annotated[
-    tuple[AtPort[Formula | FormulaList], ...], at_ports(as_all_measured, FORMULAS, "a bias, or ports with biases")
+    tuple[AtPort[Values], ...],
+    at_ports(as_values, VALUES, "a bias, or ports with biases", NUMBERS.known),
 ]
 NoiseField = Annotated[tuple[AtPort[Formula], ...], at_ports(as_formula, FORMULA, "a noise, or ports with noises")]
 

@@ -53,11 +53,11 @@ def layout_settings(
 ) -> LayoutSettings:
     """The ``layout`` section, and those of modules. Which engines there are is known where they are called; here only
     words are checked."""
-    if all(scope.section.layout is None for scope in scopes):
+    boxes = [*_boxes_in_tables(census)]
+    if not boxes and all(scope.section.layout is None for scope in scopes):
         return LayoutSettings()
     pins = pins_of(scopes, census, findings)
     arrange: list[tuple[tuple[int, ...], str]] = []
-    boxes: list[tuple[str, tuple[int, ...]]] = []
     for scope, directory in zip(scopes, census.directories, strict=True):
         if scope.section.layout is not None:
             arrange += _arrangements(scope.section.layout, directory, findings)
@@ -151,6 +151,15 @@ def _boxes(
     its neurons. A box with an invalid reference is given, too, with nothing in it."""
     for name, reference in model.boxes.items():
         yield scope.called(name), known(resolve(reference.parts, directory, findings, instances=True), ())
+
+
+def _boxes_in_tables(census: Census) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """The titles and the neurons of boxes that tables give to neurons one by one."""
+    members: dict[str, list[int]] = {}
+    for built in census.groups:
+        for neuron, title in enumerate(built.boxes, built.group.start):
+            members.setdefault(title, []).append(neuron)
+    yield from ((title, tuple(neurons)) for title, neurons in members.items() if title)
 
 
 def _check_engine(engine: Located[str], findings: Findings) -> None:

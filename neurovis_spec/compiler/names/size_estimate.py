@@ -24,6 +24,7 @@ from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.modules import InstanceModel
 from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.tables import TableColumn
 from neurovis_spec.language.unknown import UNKNOWN, Names
 
 #: The instances of one module: for each entry that makes some how many these are, and what is set in each of them.
@@ -167,7 +168,8 @@ def _wait(entered: Iterable[_Entered], waiting: Mapping[str, _Made]) -> int:
 def size_of(group: GroupModel, constants: Constants, known: Mapping[str, FloatArray], rows: int) -> FloatArray:
     """How many neurons a group has, in each row."""
     if group.count is None:
-        return np.full(rows, float(len(group.names or ()) or 1))
+        names = () if isinstance(group.names, TableColumn) else group.names or ()  # no file is opened here
+        return np.full(rows, float(len(names) or 1))
     return _counted(group.count, constants, known, rows)
 
 

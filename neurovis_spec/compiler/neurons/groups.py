@@ -22,13 +22,22 @@ from neurovis_spec.compiler.names.references import key_span, known_inputs
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.names.state_references import no_port, no_state
 from neurovis_spec.compiler.network import Group, Input
-from neurovis_spec.compiler.neurons.labels import labels_of
+from neurovis_spec.compiler.neurons.labels import check_length, labels_of
 from neurovis_spec.compiler.neurons.positions import positions_of
 from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, Kind
-from neurovis_spec.compiler.values.arguments import Settled, as_states, check_initials, neurons, settled_of, spread
+from neurovis_spec.compiler.values.arguments import (
+    Each,
+    Settled,
+    as_states,
+    check_initials,
+    neurons,
+    settled_of,
+    spread,
+)
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.definitions import Definitions
 from neurovis_spec.compiler.values.draws import Stream
+from neurovis_spec.compiler.values.table_values import TableReader
 from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.expressions.tree import Tree, draws
 from neurovis_spec.language.located import (
@@ -43,8 +52,9 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.tables import TableColumn
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
-from neurovis_spec.language.values import AtPort, Choice, FormulaList, Initial, all_in_unit
+from neurovis_spec.language.values import AtPort, Choice, Initial, Values, all_in_unit
 from neurovis_spec.language.yaml.source import AnyList, Scalar
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.likeness import meant, nearest
@@ -85,6 +95,8 @@ class Built(NamedTuple):
     #: the names of its neurons in their scope, and what stands at them in pictures
     names: tuple[str, ...]
     labels: tuple[str, ...]
+    #: the box of each, "" where it is in none, if a table says so
+    boxes: tuple[str, ...]
     bias: FloatArray
     #: the activities at step 0, NaN where none is given
     initial: FloatArray
@@ -163,18 +175,19 @@ class Builder:
             findings.error("duplicate-name", key_span(self.scope.section, "neurons", name), message)
         names, first_number = (UNKNOWN, None) if _may_lack_names(model) else self._names(name, model, start)
         n = UNKNOWN if names is UNKNOWN else len(names)
-        kind = self._kind(name, model, n)
+        table = TableReader(self.scope.files, names, self.scope.called(""))
+        kind = self._kind(name, model, n, table)
         self._check_combine(model, kind)
-        biases, bias_parts = self._bias(model, n, name, kind)
+        biases, bias_parts = self._bias(model, n, name, kind, table)
         given = as_states(model.initial or _NO_INITIAL, kind.model.definition, findings)
-        initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name)
-        starts = self._starts(given, n, name, kind, model) if given.states else _NO_STARTS
+        initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name, table)
+        starts = self._starts(given, n, name, kind, model, table) if given.states else _NO_STARTS
         inputs = self._inputs(model, n, name, kind)
-        position, position_parts = self._position(model, n)
+        position, position_parts = self._position(model, n, table)
         noises = self._noises(model, name, kind)
         if names is UNKNOWN or n is UNKNOWN:
             return UNKNOWN
-        labels = self._labels(model, names)
+        labels = self._labels(model, names, table)
         group = Group(
             name=self.scope.called(name),
             start=start,
@@ -185,7 +198,7 @@ class Builder:
             activation_parameters=_numbers(kind.activation.parameters),
             model_parameters=_numbers(kind.model.parameters),
             input=self._input_name(model),
-            box=None if model.box is None else self.scope.called(model.box.value),
+            box=self.scope.called(model.box.value) if isinstance(model.box, Located) else None,
             role=None if model.role is None else model.role.value,
             description=value_or(model.description, None),
             module=self.scope.module,
@@ -198,6 +211,7 @@ class Builder:
             model=model,
             names=names,
             labels=known(labels, names),
+            boxes=self._boxes(model, table),
             bias=biases.pop(DRIVE, _defaults(n).bias),
             initial=_defaults(n).initial if initial is UNKNOWN else initial,
             input=inputs.pop(DRIVE, _defaults(n).input),
@@ -233,7 +247,7 @@ class Builder:
             self.constants.findings.error("jump-not-linear", combine.span, message, hint)
 
     def _bias(
-        self, model: GroupModel, n: int | Unknown, name: str, kind: NeuronType
+        self, model: GroupModel, n: int | Unknown, name: str, kind: NeuronType, table: TableReader
     ) -> tuple[dict[str, FloatArray], list[Part]]:
         """The bias by ports, where there is one, and what of it follows parameters."""
         result: dict[str, FloatArray] = {}
@@ -242,7 +256,7 @@ class Builder:
         for port, formulas in self._at_ports(model.bias, name, kind, model):
             formulas = all_in_unit(formulas, units.get(port, ""), self.constants.findings)
             with self.constants.following() as parts:
-                bias = self._drawn(formulas, n, "bias", name, None if port == DRIVE else port)
+                bias = self._drawn(formulas, n, "bias", name, table, None if port == DRIVE else port)
             if bias is not UNKNOWN:
                 result[port] = bias
             following += [part._replace(field=BIAS.name, name=port) for part in parts]
@@ -254,16 +268,18 @@ class Builder:
         found = ((port, formula, _noise_of(formula, self.constants)) for port, formula in written)
         return tuple(WrittenNoise(port, formula, tree) for port, formula, tree in found if tree is not UNKNOWN)
 
-    def _position(self, model: GroupModel, n: int | Unknown) -> tuple[FloatArray | Unknown, list[Part]]:
+    def _position(
+        self, model: GroupModel, n: int | Unknown, table: TableReader
+    ) -> tuple[FloatArray | Unknown, list[Part]]:
         """The positions, NaN without any, and what of them follows parameters."""
         if model.position is None:
             return UNKNOWN if n is UNKNOWN else _defaults(n).position, []
         with self.constants.following() as parts:
-            position = positions_of(model.position, n, self.constants, self.scope.files)
+            position = positions_of(model.position, n, self.constants, table)
         return position, [part._replace(field="position") for part in parts]
 
     def _starts(
-        self, given: Initial, n: int | Unknown, name: str, kind: NeuronType, model: GroupModel
+        self, given: Initial, n: int | Unknown, name: str, kind: NeuronType, model: GroupModel, table: TableReader
     ) -> dict[str, FloatArray]:
         """What states of the model begin with, as far as that is given."""
         result: dict[str, FloatArray] = {}
@@ -276,7 +292,7 @@ class Builder:
                 found = no_state("model", neuron.name, f"of '{name}'", state.value, states)
                 found.report("unknown-state", state.span, self.constants.findings)
             formulas = all_in_unit(formulas, units.get(state.value, ""), self.constants.findings)
-            values = self._drawn(formulas, n, "initial", name, state.value)
+            values = self._drawn(formulas, n, "initial", name, table, state.value)
             if values is not UNKNOWN:
                 result[state.value] = values
         return result
@@ -295,14 +311,17 @@ class Builder:
         count = None if model.count is None else self.constants.integer(model.count, "'count'", 1)
         if count is UNKNOWN:
             return UNKNOWN, None
-        total = start + (count or len(model.names or ()) or 1)
+        written = self._names_in_table(model.names) if isinstance(model.names, TableColumn) else model.names
+        if written is UNKNOWN:
+            return UNKNOWN, None
+        total = start + (count or len(written or ()) or 1)
         if total > self.limits.neurons:
             span = key_span(self.scope.section, "neurons", name) if model.count is None else model.count.span
             message = f"this makes {amount(total)} neurons; the limit is {self.limits.neurons:,}"
             findings.error("too-many", span, message, "raise it with --limit")
             return UNKNOWN, None
-        if model.names is not None:
-            return self._written_names(model, count), None
+        if written is not None:
+            return self._written_names(written, model, count), None
         if count is None:
             return (name,), None
         first = 1 if model.first is None else self.constants.integer(model.first, "'first'", 0)
@@ -314,13 +333,32 @@ class Builder:
             return UNKNOWN, None
         return names, first
 
-    def _written_names(self, model: GroupModel, count: int | None) -> tuple[str, ...] | Unknown:
-        """The names listed under ``names``; UNKNOWN where it is not known how many neurons these are."""
+    def _names_in_table(self, wanted: TableColumn) -> tuple[Located[str], ...] | Unknown:
+        """The names in a column of a table, each of which is a name, and none twice."""
+        found = TableReader(self.scope.files, UNKNOWN, "").all_texts(wanted)
+        if found is UNKNOWN:
+            return UNKNOWN
+        (column,), findings, rows = wanted.columns, self.constants.findings, dict[str, int]()
+        before = findings.errors
+        for name, row in found:
+            if not IDENTIFIER.fullmatch(name):
+                message = f"row {row} of the table: {bad_name(name)}"
+                findings.error("bad-name", column.span, message, name_hint(name), key=row)
+            elif rows.setdefault(name, row) != row:
+                message = f"row {row} of the table: '{name}' is named before (row {rows[name]})"
+                findings.error("duplicate-neuron", column.span, message, key=row)
+            if findings.errors - before >= PATIENCE:
+                break
+        return UNKNOWN if findings.errors > before else tuple(Located(name, column.node) for name in rows)
+
+    def _written_names(
+        self, written: tuple[Located[str], ...], model: GroupModel, count: int | None
+    ) -> tuple[str, ...] | Unknown:
+        """The names under ``names``; UNKNOWN where it is not known how many neurons these are."""
         findings = self.constants.findings
-        assert model.names is not None
         seen: dict[str, Located[str]] = {}
         before = findings.errors
-        for item in model.names:
+        for item in written:
             if not IDENTIFIER.fullmatch(item.value):
                 findings.error("bad-name", item.span, bad_name(item.value), name_hint(item.value))
             elif item.value in seen:
@@ -330,37 +368,37 @@ class Builder:
             if findings.errors - before >= PATIENCE:
                 break
         if findings.errors > before:  # how many they are is known
-            return tuple(item.value for item in model.names)
+            return tuple(item.value for item in written)
         if not seen or (count is not None and count != len(seen)):
             wanted = "at least one is wanted" if count is None else f"'count' says {count}"
             node = model.source.get("names")
-            span = model.names[0].span if model.names else model.source.span if node is None else node.span
+            span = written[0].span if written else model.source.span if node is None else node.span
             findings.error("wrong-size", span, f"'names' has {plural(len(seen), 'name')}, {wanted}")
             return UNKNOWN
         return tuple(seen)
 
-    def _kind(self, name: str, model: GroupModel, n: int | Unknown) -> NeuronType:
+    def _kind(self, name: str, model: GroupModel, n: int | Unknown, table: TableReader) -> NeuronType:
         """The activation and the model of the neurons; ``identity`` and ``static`` where these are invalid."""
         if n is UNKNOWN or not (_fixed(model.activation) and _fixed(model.model)):
-            return self._neuron_type(model, n)
+            return self._neuron_type(model, neurons(n, table), n)
         if self._plain(model.activation, ACTIVATION) and self._plain(model.model, MODEL):
             # what says no more than names is the same in every group: there may be very many of these
             name = f"{_name_of(model.activation)} {_name_of(model.model)}"
         key = self.scope.module, name, n
         if key not in self.kinds:
-            self.kinds[key] = self._neuron_type(model, n)
+            self.kinds[key] = self._neuron_type(model, neurons(n), n)
         return self.kinds[key]
 
-    def _neuron_type(self, model: GroupModel, n: int | Unknown) -> NeuronType:
-        activation = self._settled(model.activation or _default("identity", model), ACTIVATION, n)
+    def _neuron_type(self, model: GroupModel, each: Each, n: int | Unknown) -> NeuronType:
+        activation = self._settled(model.activation or _default("identity", model), ACTIVATION, each, n)
         choice = model.model or _default("static", model)
-        neuron = self._settled(choice, MODEL, n)
+        neuron = self._settled(choice, MODEL, each, n)
         check_initials(neuron, choice, self.constants)
         return NeuronType(activation, neuron)
 
-    def _settled(self, choice: Choice, kind: Kind, n: int | Unknown) -> Settled:
+    def _settled(self, choice: Choice, kind: Kind, each: Each, n: int | Unknown) -> Settled:
         """The definition that a group names, with its settings; where it is invalid that of groups that name none."""
-        found = settled_of(choice, kind, self.definitions, self.constants, neurons(n), n)
+        found = settled_of(choice, kind, self.definitions, self.constants, each, n)
         if found is not UNKNOWN and found.sound:
             return found
         plain = self.definitions.of(kind).known()["identity" if kind == ACTIVATION else "static"]
@@ -372,9 +410,17 @@ class Builder:
         return choice is None or (not choice.settings.entries and choice.name.value in known)
 
     def _drawn(
-        self, formulas: Formula | FormulaList, n: int | Unknown, purpose: str, name: str, state: str | None = None
+        self,
+        formulas: Values,
+        n: int | Unknown,
+        purpose: str,
+        name: str,
+        table: TableReader,
+        state: str | None = None,
     ) -> FloatArray | Unknown:
         """The values of a key, or those of a state in it, of the group's neurons."""
+        if isinstance(formulas, TableColumn):
+            return table.numbers(formulas)
         called, what = self.scope.called(name), purpose
         if state is not None:
             called, what = f"{called}.{state}", state
@@ -407,10 +453,22 @@ class Builder:
         findings.error("wrong-size", text.span, message, "an input has one component, or one for each neuron")
         return UNKNOWN
 
-    def _labels(self, model: GroupModel, names: tuple[str, ...]) -> tuple[str, ...] | Unknown:
+    def _boxes(self, model: GroupModel, table: TableReader) -> tuple[str, ...]:
+        """The box of each neuron, if a table says so."""
+        if not isinstance(model.box, TableColumn):
+            return ()
+        titles = known(table.texts(model.box, gaps=True), ())
+        return tuple(title and self.scope.called(title) for title in titles)
+
+    def _labels(self, model: GroupModel, names: tuple[str, ...], table: TableReader) -> tuple[str, ...] | Unknown:
         """What stands at the neurons in pictures; UNKNOWN where that is invalid."""
         if model.label is None:
             return names
+        if isinstance(model.label, TableColumn):
+            texts = table.texts(model.label)
+            (column,) = model.label.columns
+            labels = (Located(text, column.node) for text in known(texts, ()))
+            return texts if all(check_length(label, self.constants.findings) for label in labels) else UNKNOWN
         node = model.source.get("label")
         if node is None or isinstance(node, Scalar) or len(model.label) == len(names):
             return labels_of(model.label, len(names), self.scope)

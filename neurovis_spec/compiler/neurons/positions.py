@@ -16,12 +16,13 @@ from neurovis_spec.compiler.limits import PATIENCE, plural
 from neurovis_spec.compiler.values.cells import cells_of, values_of
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
+from neurovis_spec.compiler.values.table_values import TableReader
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import formula_of
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
-from neurovis_spec.language.tables import FileReference
+from neurovis_spec.language.tables import FileReference, TableColumn
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import FLAT
 from neurovis_spec.language.yaml.source import TEXT, AnyList, Scalar, Sequence
@@ -31,11 +32,13 @@ _TWO = "a position is two numbers"
 
 
 def positions_of(
-    node: FileReference | AnyList, n: int | Unknown, constants: Constants, files: Files
+    node: FileReference | TableColumn | AnyList, n: int | Unknown, constants: Constants, table: TableReader
 ) -> FloatArray | Unknown:
     """One position for each of n neurons."""
+    if isinstance(node, TableColumn):
+        return table.positions(node)
     if isinstance(node, FileReference):
-        return _from_file(node, n, constants.findings, files)
+        return _from_file(node, n, constants.findings, table.files)
     return _from_rows(node, n, constants)
 
 
@@ -88,10 +91,14 @@ def _one_for_all(node: AnyList, n: int) -> bool:
     return len(scalars) == 2 and any(isinstance(scalar.value, str) for scalar in scalars)
 
 
-def depend_on_positions(node: FileReference | AnyList | None, constants: Constants) -> None:
+def depend_on_positions(node: FileReference | TableColumn | AnyList | None, constants: Constants) -> None:
     """Mark the parameters in these positions as structural: something that is fixed in a run depends on them."""
     quiet = replace(constants, findings=Findings())
-    cells = UNKNOWN if node is None or isinstance(node, FileReference) else cells_of(node, quiet.findings, "")
+    cells = (
+        UNKNOWN
+        if node is None or isinstance(node, (FileReference, TableColumn))
+        else cells_of(node, quiet.findings, "")
+    )
     for cell in () if cells is UNKNOWN else np.flatnonzero(cells.kinds == TEXT).tolist():
         assert cells is not UNKNOWN
         formula = formula_of(cells.node(cell), quiet.findings)

@@ -19,13 +19,14 @@ from neurovis_spec.compiler.program import RULE, SYNAPSE, Definition, Kind
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, value_of
 from neurovis_spec.compiler.values.definitions import Default, Defined, Definitions, check_bounds
 from neurovis_spec.compiler.values.draws import Stream
+from neurovis_spec.compiler.values.table_values import TableReader
 from neurovis_spec.diagnostics import Findings, Hint, Home, Undeclared, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.language.keys import settings_of
 from neurovis_spec.language.located import IDENTIFIER, Formula, Located, formula_of, in_unit
-from neurovis_spec.language.tables import is_from_table
+from neurovis_spec.language.tables import is_from_table, numbers_column
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import AnyList, Entry, Scalar, one_or_more
@@ -69,9 +70,17 @@ class Each(NamedTuple):
         return result
 
 
-def neurons(n: int | Unknown) -> Each:
-    """n neurons of a group: ``i`` and ``n``."""
-    return Each("neuron", {"i": UNKNOWN if n is UNKNOWN else np.arange(n, dtype=np.int64), "n": n})
+def neurons(n: int | Unknown, table: TableReader | None = None) -> Each:
+    """n neurons of a group: ``i`` and ``n``; what a table has for them."""
+    names = {"i": UNKNOWN if n is UNKNOWN else np.arange(n, dtype=np.int64), "n": n}
+    if table is None:
+        return Each("neuron", names)
+
+    def value(node: Written) -> FloatArray | Unknown:
+        wanted = numbers_column(node, table.files.findings)
+        return UNKNOWN if wanted is UNKNOWN else table.numbers(wanted)
+
+    return Each("neuron", names, value)
 
 
 class Settled(NamedTuple):

@@ -8,18 +8,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from neurovis_spec.compiler.limits import amount
 from neurovis_spec.diagnostics import Findings, shorten
-from neurovis_spec.language.data.files import CellError, NamedFile, Room, Table, read_edges, read_table
+from neurovis_spec.language.data.files import (
+    CellError,
+    NamedFile,
+    Room,
+    Table,
+    read_column,
+    read_edges,
+    read_sheet,
+    read_table,
+)
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.tables import EdgeFile, FileReference
+from neurovis_spec.language.tables import EdgeFile, FileReference, TableColumn
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 if TYPE_CHECKING:
+    from neurovis_spec.arrays import FloatArray
     from neurovis_spec.language.data.edge_list import EdgeTable
+    from neurovis_spec.language.data.sheet import Sheet
 
 T = TypeVar("T")
 #: Cells of a table that is read whatever its place needs: what is said of it then is more exact.
@@ -56,6 +68,31 @@ class _Shelf(Generic[T]):
 
 
 @dataclass
+class OpenSheet:
+    """A table whose columns have names, each of which is read once as numbers or texts."""
+
+    sheet: Sheet
+    named: NamedFile
+    findings: Findings
+    _numbers: dict[str, FloatArray | Unknown] = field(default_factory=dict)
+    _texts: dict[str, tuple[str, ...] | Unknown] = field(default_factory=dict)
+
+    def numbers(self, column: Located[str]) -> FloatArray | Unknown:
+        """A column of numbers, NaN where a cell is empty; UNKNOWN where one is invalid, which is reported."""
+        if column.value not in self._numbers:
+            read = partial(self.sheet.numbers, column)
+            self._numbers[column.value] = read_column(self.named, read, self.findings)
+        return self._numbers[column.value]
+
+    def texts(self, column: Located[str]) -> tuple[str, ...] | Unknown:
+        """A column of texts, "" where a cell is empty."""
+        if column.value not in self._texts:
+            read = partial(self.sheet.texts, column)
+            self._texts[column.value] = read_column(self.named, read, self.findings)
+        return self._texts[column.value]
+
+
+@dataclass
 class Files:
     """The data files that a spec names. What is invalid in one is reported once, where it is named first."""
 
@@ -64,6 +101,7 @@ class Files:
     findings: Findings
     _tables: _Shelf[Table] = field(default_factory=_Shelf)
     _edges: _Shelf[EdgeTable] = field(default_factory=_Shelf)
+    _sheets: dict[Hashable, OpenSheet | Unknown] = field(default_factory=dict)
 
     def table(
         self, reference: FileReference, shape: tuple[int, int] | None = None, *, full: str = "", keyed: bool = True
@@ -92,7 +130,9 @@ class Files:
         return table
 
     def _named(self, reference: FileReference) -> NamedFile:
-        return NamedFile(reference.path.value, self.root, self.base, reference.path.span, reference.key)
+        return NamedFile(
+            reference.path.value, self.root, self.base, reference.path.span, reference.key, reference.inline
+        )
 
     def table_at(self, path: Located[str]) -> Table | Unknown:
         """The table of an input: of any size, beside whose path no key can stand."""
@@ -106,6 +146,16 @@ class Files:
             self.findings.error("file-format", path.span, message)
             return UNKNOWN
         return self.table(FileReference(path, None, path.span), full="a spike needs a number everywhere", keyed=False)
+
+    def sheet(self, wanted: TableColumn) -> OpenSheet | Unknown:
+        """The rows of a table that count, whose columns have names."""
+        key = None if wanted.file.key is None else wanted.file.key.value
+        what = wanted.file.path.value, wanted.file.inline, key, *(one.what for one in wanted.where)
+        if what not in self._sheets:
+            named = self._named(wanted.file)
+            sheet = read_sheet(named, wanted.where, self.findings)
+            self._sheets[what] = UNKNOWN if sheet is UNKNOWN else OpenSheet(sheet, named, self.findings)
+        return self._sheets[what]
 
     def edges(self, written: EdgeFile, most: int | None = None) -> EdgeTable | Unknown:
         """The edges of a file of text, at most so many."""

@@ -303,7 +303,8 @@ class _Reader:
     def _take(self, lines: bytes, number: int) -> None:
         """Take lines, of which the first has this number. Raises CellError where there is no reading on."""
         self._rows = number + lines.count(b"\n") - 1
-        some = lines_of(lines, len(self._written.header), self._written.separator.byte)
+        width, separator = len(self._written.header), self._written.separator.byte
+        some = None if b'"' in lines else lines_of(lines, width, separator)
         if some is not None and self._quickly(some, number):
             return
         for row in rows_of(lines, number, self._written.separator):
@@ -314,7 +315,7 @@ class _Reader:
     def _quickly(self, lines: Lines, number: int) -> bool:
         """Take rows, column by column; False, and none is taken, where one of them is invalid or may be."""
         chosen = rows_picked(self._written.picked, lines)
-        rows = np.arange(len(lines)) if chosen is None else chosen
+        rows = np.arange(lines.rows) if chosen is None else chosen
         columns = {name: lines.column(at) for name, at in self._places.items()}
         if chosen is not None:
             columns = {name: cells.some(chosen) for name, cells in columns.items()}

@@ -7,15 +7,15 @@ reads a kind of file is imported with the first file of that kind.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import islice
 from pathlib import Path, PureWindowsPath
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full, in_cell
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.tables import DATA_FILES, TEXT_FILES, EdgeFile
+from neurovis_spec.language.tables import DATA_FILES, TABLE_FILES, TEXT_FILES, Condition, EdgeFile
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.opening import FileFault, read_parts
 from neurovis_spec.likeness import suggest
@@ -23,9 +23,23 @@ from neurovis_spec.real_paths import real_path
 
 if TYPE_CHECKING:
     from neurovis_spec.language.data.edge_list import EdgeTable
+    from neurovis_spec.language.data.sheet import Sheet
 
-__all__ = ["DATA_FILES", "CellError", "NamedFile", "Room", "Table", "locate", "read_data", "read_edges", "read_table"]
+__all__ = [
+    "DATA_FILES",
+    "CellError",
+    "NamedFile",
+    "Room",
+    "Table",
+    "locate",
+    "read_column",
+    "read_data",
+    "read_edges",
+    "read_sheet",
+    "read_table",
+]
 
+T = TypeVar("T")
 LARGEST: Final = 256 << 20  # bytes; ten million connections in double precision are 80 MB
 #: characters of a path: what common systems take
 LONGEST_PATH: Final = 4096
@@ -40,13 +54,19 @@ _FROM: Final = "paths are relative to the file that names them"
 
 class NamedFile(NamedTuple):
     """A file as an author names it: by a path relative to ``base``, inside ``root`` also behind symbolic links; where
-    that stands, and with which ``key`` of an array in it."""
+    that stands, and with which ``key`` of an array in it. ``inline``: the path is no path but the text itself."""
 
     path: str
     root: Path
     base: Path
     span: Span
     key: Located[str] | None = None
+    inline: bool = False
+
+    @property
+    def called(self) -> str:
+        """What it is called in a sentence."""
+        return "the table" if self.inline else f"the file '{_short(self.path)}'"
 
 
 def locate(file: NamedFile, findings: Findings) -> Path | Unknown:
@@ -54,7 +74,7 @@ def locate(file: NamedFile, findings: Findings) -> Path | Unknown:
 
     Codes: ``path-outside``, ``file-missing``. Whether there is such a file is not asked here.
     """
-    path_text, root, base, span, _ = file
+    path_text, root, base, span, *_ = file
     shown = _short(path_text)
     if not path_text or "\0" in path_text:
         findings.error("file-missing", span, "this is no path of a file")
@@ -138,7 +158,7 @@ def read_table(
             error = CellError("file-format", str(error), "keep the one that is meant in a file of its own")
         place = key.span if key is not None and error.code == "unknown-array" else file.span
         shown = data if inside and suffix == ".csv" else None
-        _refuse(error, file.path, place, findings, gaps=gaps and not inside, shown=shown)
+        _refuse(error, file.called, place, findings, gaps=gaps and not inside, shown=shown)
         return UNKNOWN
 
 
@@ -194,12 +214,46 @@ def read_edges(
     try:
         table = parse_edges(parts, room, written)
     except CellError as error:
-        _refuse(error, named.path, named.span, findings)
+        _refuse(error, named.called, named.span, findings)
         return UNKNOWN
     note(named, table.about, findings)
     if table.fault is not None:
-        _refuse(table.fault, named.path, named.span, findings)
+        _refuse(table.fault, named.called, named.span, findings)
     return table
+
+
+def read_sheet(named: NamedFile, where: tuple[Condition, ...], findings: Findings) -> Sheet | Unknown:
+    """A table whose columns have names, of the rows that count. Codes: those of ``read_data``, and ``file-format``,
+    ``invalid-utf8``, ``too-large``, ``useless-key``."""
+    if not named.inline and Path(named.path).suffix.lower() not in TABLE_FILES:
+        message = f"'{_short(named.path)}' is no kind of file whose columns have names"
+        findings.error("file-format", named.span, message, "known: " + ", ".join(TABLE_FILES))
+        return UNKNOWN
+    if named.key is not None:
+        _refuse_key(named.key, findings)
+        return UNKNOWN
+    data = named.path.encode("utf-8", "replace") if named.inline else read_data(named, findings)
+    if data is UNKNOWN:
+        return UNKNOWN
+    from neurovis_spec.language.data.sheet import parse_sheet
+
+    try:
+        sheet = parse_sheet(data, "" if named.inline else named.path, where)
+    except CellError as error:
+        _refuse(error, named.called, named.span, findings)
+        return UNKNOWN
+    if not named.inline:
+        note(named, sheet.about, findings)
+    return sheet
+
+
+def read_column(named: NamedFile, read: Callable[[], T], findings: Findings) -> T | Unknown:
+    """What is read of a column of a sheet; UNKNOWN where something of it is invalid, which is reported."""
+    try:
+        return read()
+    except CellError as error:
+        _refuse(error, named.called, named.span, findings)
+        return UNKNOWN
 
 
 def note(named: NamedFile, about: str, findings: Findings) -> None:
@@ -215,7 +269,7 @@ def _refuse_key(key: Located[str], findings: Findings) -> None:
 
 
 def _refuse(
-    error: CellError, path_text: str, span: Span, findings: Findings, *, gaps: bool = True, shown: bytes | None = None
+    error: CellError, called: str, span: Span, findings: Findings, *, gaps: bool = True, shown: bytes | None = None
 ) -> None:
     """All that is wrong with a file; at the cells of a file of text, where this is ``shown``."""
     from neurovis_spec.language.data.csv_table import cell_at
@@ -225,7 +279,7 @@ def _refuse(
         if shown is None:
             message, at = str(one), one.span or span
             if one.span is None:
-                message = f"the file '{_short(path_text)}': {one}"
+                message = f"{called}: {one}"
             findings.error(one.code, at, message, hint, key=number)
         else:
             place = cell_at(shown, span.file, one.at) if any(one.at) else span
