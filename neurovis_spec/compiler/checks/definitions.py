@@ -243,9 +243,9 @@ def check_dt(
         inputs = (model for section in sections for model in section.inputs.values())
         counted = next((one for one in inputs if one.poisson or one.spikes), None)
         if counted is not None:
+            entry = next(one for one in counted.source.entries if one.name in ("spikes", "poisson"))
             what = "spikes come at times in seconds" if counted.spikes else "a rate is per second"
-            span = counted.source.entries[0].key.span
-            findings.error("dt-needed", span, f"{what}, and no 'dt' says how long a step is", hint)
+            findings.error("dt-needed", entry.key.span, f"{what}, and no 'dt' says how long a step is", hint)
         return
     one, *others = first_of.values()
     first = next((state.name for state in one.definition.flows), one.definition.given.name)
