@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from small_specs import HEAD, codes, compiled
 
 import neurovis_spec as nv
+from neurovis_spec.compiler.connections.pattern_settings import Values
 from neurovis_spec.compiler.connections.patterns import RECIPES
 
 GROUPS = "parameters: {size: 10000}\nneurons: {A: {count: size, bias: 1}, B: {count: size, bias: 1}}\n"
@@ -90,5 +91,6 @@ def test_no_pattern_makes_fewer_than_are_counted(n: int, m: int, what: str, size
             network = compiled(f"{text}connections: {{A -> B: {{pattern: {written}}}}}\n").network
         except nv.SpecError:
             continue
-        assert RECIPES[name].least(n, m, settings) <= len(network.connections) + (name == "chain")
+        values = Values({one: float(value) for one, value in settings.items()})
+        assert RECIPES[name].least(n, m, values) <= len(network.connections) + (name == "chain")
         assert np.all(network.connections.sources.whole() < n)
