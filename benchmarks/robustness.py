@@ -243,6 +243,21 @@ def _edges(data: bytes, seconds: float = 0.2, mib: float = 60) -> Case:
     return Case(text, _write("e.csv", data), seconds, mib)
 
 
+def _their_edges(data: bytes, seconds: float = 0.2, mib: float = 60) -> Case:
+    """Edges by columns of others, of rows that are picked, with a value in a further column."""
+    columns = "columns: {from: a, to: b}, where: {c: x}"
+    body = f"{{edges: {{file: e.tsv, {columns}}}, plasticity: {{decay: {{rate: {{column: d}}}}}}}}"
+    text = HEAD + f"neurons: {{A: {{}}, B: {{}}}}\nconnections: {{A -> B: {body}}}\n"
+    return Case(text, _write("e.tsv", data), seconds, mib)
+
+
+def _sheet(data: bytes, name: str = "a.csv", seconds: float = 0.2, mib: float = 60, count: int = 2) -> Case:
+    """A table of which two settings take columns, by the names of neurons and in order."""
+    by, order = f"{{file: {name}, by: n, column: x}}", f"{{file: {name}, column: y, where: {{z: 1}}}}"
+    text = HEAD + f"neurons: {{K: {{count: {count}, bias: {by}, initial: {order}}}}}\n"
+    return Case(text, _write(name, data), seconds, mib)
+
+
 def _header(shape: str, descr: str = "'<f8'") -> str:
     return f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}"
 
@@ -283,6 +298,32 @@ FILES: dict[str, Case] = {
     ".csv with a quote never closed": _file("a.csv", b'"' + b"1,2\n" * 250_000),
     "edges: 200,000 rows, the last ragged": _edges(b"from,to,weight\n" + b"A,B,1\n" * 200_000 + b"A\n"),
     "edges: a header of a million cells": _edges(b"from," * 1_000_000),
+    "their edges: 200,000 rows, the last ragged": _their_edges(
+        b"a\tb\tc\td\n" + b"A\tB\tx\t1\n" * 200_000 + b"A\n", 0.4
+    ),
+    "their edges: 200,000 kinds of row": _their_edges(
+        b"a\tb\tc\td\n" + b"".join(b"A\tB\tx%d\t1\n" % k for k in range(200_000)), 1, 80
+    ),
+    "their edges: no row counts": _their_edges(b"a\tb\tc\td\n" + b"A\tB\ty\t1\n" * 200_000, 0.4),
+    "their edges: a header of a million cells": _their_edges(b"a\t" * 1_000_000 + b"b\tc\td\n"),
+    "their edges: blanks alone": _their_edges(b" " * 10_000_000, 0.5, 80),
+    "a table: 200,000 rows, the last ragged": _sheet(b"n;x;y;z\n" + b"K1;1;1;1\n" * 200_000 + b"K2\n", seconds=1),
+    "a table: 200,000 names, one twice": _sheet(
+        b"n,x,y,z\n" + b"".join(b"K%d,1,1,1\n" % k for k in range(200_000)) + b"K1,1,1,1\n", seconds=1, mib=100
+    ),
+    "a table: 100,000 neurons of which no row is": _sheet(
+        b"n,x,y,z\n" + b"".join(b"L%d,1,1,1\n" % k for k in range(100_000)), seconds=1, mib=100, count=100_000
+    ),
+    "a table: 200,000 rows in quotes": _sheet(b'n,x,y,z\n"K1",1,"y",1\n' * 200_000, seconds=3, mib=100),
+    "a table: a quote never closed": _sheet(b'n,x,y,z\n"' + b"K1,1,1,1\n" * 200_000),
+    "a table: a header of a million cells": _sheet(b"n," * 1_000_000 + b"x,y,z\n"),
+    "a table: 31 million separators": _sheet(
+        b"n;x;y;z" + b";" * 900 + b"\n" + (b";" * 903 + b"\n") * 34_000, mib=500, seconds=4
+    ),
+    "a table: a cell of 10 MB": _sheet(b"n x y z\nK1 " + b"9" * 10_000_000 + b" 1 1\n", seconds=0.7),
+    "a table: NUL bytes": _sheet(b"n\tx\ty\tz\n" + b"\0" * 1_000_000, "a.tsv"),
+    "a table: numbers beyond double precision": _sheet(b"n,x,y,z\n" + b"K1,1e999,1e999,1\n" * 100_000, seconds=1),
+    "a table that is a picture": _sheet(b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 400),
     ".csv that is a picture": _file("a.csv", b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 400),
 }
 

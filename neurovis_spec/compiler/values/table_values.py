@@ -15,6 +15,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.limits import PATIENCE, plural
+from neurovis_spec.compiler.names.references import few
 from neurovis_spec.compiler.values.data_files import Files, OpenSheet
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.located import Located
@@ -137,7 +138,7 @@ class TableReader:
                 findings.error("file-format", by.span, f"{pair} of the table are both of '{shorten(own)}'", key=own)
             elif rows[neuron] < 0 and wanted.default is None:
                 message = f"no row of the table is of '{shorten(self.path + name)}'"
-                hint = partial(suggest, name, called, "there are")
+                hint = partial(suggest, name, few(name, called), "there are")
                 findings.error("file-format", by.span, message, hint, key=name)
             if findings.errors - before >= PATIENCE:
                 break

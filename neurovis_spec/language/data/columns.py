@@ -32,6 +32,8 @@ _FIRST_ROOM: Final = 1 << 10
 _MASKS: Final = np.array([(1 << 8 * size) - 1 for size in range(9)], dtype=np.uint64)
 #: odd numbers that spread words over places (the golden ratio's, as in Knuth 6.4, and powers of it)
 _SPREAD: Final = [np.uint64(pow(0x9E3779B97F4A7C15, power, 1 << 64)) for power in range(1, _WORDS + 1)]
+#: texts of a column that are compared with one that it has not
+_COMPARED: Final = 1000
 #: columns that are named where one is not found
 _NAMED: Final = 20
 
@@ -194,14 +196,16 @@ class Picked:
         self._condition = condition
         self._names = Names()
         #: of the text of each number whether it is one of the values; the last is that of an empty cell
-        self._taken = [_takes(condition, "")]
+        self._taken = np.array([_takes(condition, "")])
 
     def of(self, cells: Cells) -> BoolArray:
         """Which of the rows with these cells in the column."""
         numbers = self._names.of(cells)
         new = self._names.known[len(self._taken) - 1 :]
-        self._taken[-1:-1] = [_takes(self._condition, text) for text in new]
-        return np.array(self._taken, dtype=np.bool_)[numbers]
+        if new:
+            found = [_takes(self._condition, text) for text in new]
+            self._taken = np.concatenate((self._taken[:-1], found, self._taken[-1:]))
+        return self._taken[numbers]
 
     def takes(self, cell: str) -> bool:
         """Whether a row with this cell in the column."""
@@ -213,7 +217,7 @@ class Picked:
         for value in self._condition.values:
             if not any(_equals(value, text) for text in ("", *self._names.known)):
                 message = f"no row has {_shown(value)} in the column '{shorten(self._condition.column.value)}'"
-                hint = suggest(str(value.value), self._names.known, "there are")
+                hint = suggest(str(value.value), self._names.known[:_COMPARED], "there are")
                 raise CellError("file-format", message, hint, span=value.span)
 
 

@@ -47,7 +47,7 @@ MOST_COLUMNS: Final = 1000
 _INNER: Final = b"\x1f"
 _WITHIN: Final = str.maketrans("\x1f\r\n", "   ")
 #: bytes of lines that are kept together
-_STRETCH: Final = 1 << 22
+_STRETCH: Final = 1 << 20
 
 
 class Sheet(Protocol):
