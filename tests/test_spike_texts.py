@@ -124,6 +124,9 @@ models:
     activity: ACTIVITY
 neurons: {A: {count: 3, model: MODEL, COMBINE}}
 connections: {A -> A: {pattern: chain, port: kick, delay: 0}}
+synapses: {reads: {signal: weight*pre.away}}
+outputs: {}
+events: []
 """
 CIRCLE = "a: b, b: a"
 
@@ -185,3 +188,22 @@ def test_what_a_jump_and_a_rest_are_not_is_told(changes: dict[str, str], expecte
     assert len(findings) == bool(expected), findings
     expected = expected.replace("REST", "the refractory time of 'cell' is")
     assert all(one.startswith(expected) for one in findings), findings
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"COMBINE": "initial: 1"}, "initial-activity 14:47 no neuron fires at step 0"),
+        ({"COMBINE": "initial: {v: 0.5, spike: 1}"}, "initial-activity 14:56 no neuron fires at step 0"),
+        ({"COMBINE": "initial: {V: 0.5}"}, "has no state 'V'; did you mean 'v'?"),
+        ({"COMBINE": "initial: {away: 1}"}, "has no state 'away'; its states are: v"),
+        ({"port: kick": "port: kick, send: away"}, "it can send: activity, v, spike"),
+        ({"port: kick": "port: kick, synapse: reads"}, "it has: activity, v, spike, rest"),
+        ({"outputs: {}": "outputs: {o: A.away}"}, "its states are: v, spike"),
+        ({"events: []": "events: [{from: 1, to: 2, clamp: {A.away: 1}}]"}, "its states are: v, spike"),
+    ],
+)
+def test_states_of_ours_are_offered_to_nobody(changes: dict[str, str], expected: str) -> None:
+    findings = [one for one in told(**changes) if not one.startswith("unused")]
+    assert len(findings) == 1, findings
+    assert findings[0].startswith(expected) or findings[0].endswith(expected), findings

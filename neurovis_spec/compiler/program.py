@@ -220,6 +220,11 @@ class Definition:
         return tuple(one for one in own if not isinstance(one, Hidden))
 
     @property
+    def named(self) -> tuple[Quantity, ...]:
+        """What of all that is kept authors have names for: all but states of ours."""
+        return (*self.holdable, *self.outputs)
+
+    @property
     def moves_centre(self) -> bool:
         """Whether it is a rule that changes the centre of a connection, in place of the weight."""
         return self.kind == RULE and self.given.name == CENTRE

@@ -19,7 +19,7 @@ from neurovis_spec.compiler.names.state_references import (
     model_state,
 )
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import MODEL, RULE, SYNAPSE, Check, Hidden, Kind
+from neurovis_spec.compiler.program import MODEL, RULE, SYNAPSE, Check, Kind
 from neurovis_spec.language.references import Arrow, Part, Sum, parse, parse_sum, state_of
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.likeness import suggest
@@ -126,7 +126,7 @@ def _holders_of(network: Network, kind: Kind) -> tuple[Holder, ...]:
         Holder(
             holder.members,
             made.name,
-            tuple(one.name for one in made.kept if one not in made.outputs and not isinstance(one, Hidden)),
+            tuple(one.name for one in made.holdable),
             tuple(one.name for one in made.outputs),
         )
         for holder, made in ((holder, use.definition) for holder, use in network.uses)

@@ -169,7 +169,7 @@ def _report(
         other = having.kind.model.definition.name
         message = f"{what}, and the model '{other}' of '{having.name}' has '{shorten(name.name)}'; "
         message += f"that of '{lacking.name}' ('{model.name}') has none"
-    known = (MODEL.gives, *(one.name for one in model.kept), *model.parameters)
+    known = (MODEL.gives, *(one.name for one in model.named), *model.parameters)
     hint = partial(suggest, name.name, known, "it has")
     if name.name in ports_of(model):
         message = f"{what}, which is a port of the model '{model.name}' of '{lacking.name}'"

@@ -66,7 +66,7 @@ def _sends(name: Located[str], groups: Sequence[Built], findings: Findings) -> s
     """What is taken; "" where it is what all of these send by themselves."""
     for one in groups:
         model = one.kind.model.definition
-        having = (MODEL.gives, *(quantity.name for quantity in model.kept))
+        having = (MODEL.gives, *(quantity.name for quantity in model.named))
         if name.value not in having:
             message = f"the model '{model.name}' of '{one.name}' has no state and no output '{shorten(name.value)}'"
             lost = Undeclared(name.value, Home((MODEL.section, model.name), ("state", "outputs")))

@@ -200,7 +200,7 @@ def _states(name: StateName, neurons: IntArray, span: Span, at: Place) -> _Compo
         model = group.kind.model.definition
         if not is_written(group.kind, group.model):
             return UNKNOWN
-        known = tuple(one.name for one in model.kept)
+        known = tuple(one.name for one in model.named)
         if name.state not in known:
             refused = no_state("model", model.name, f"of '{shorten(name.owner.text)}'", name.state, known)
             at.findings.error("unknown-state", span, refused.message, refused.hint, undeclared=refused.undeclared)

@@ -147,19 +147,19 @@ def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
     for bundle in made.bundles:
         first, start = start, start + len(bundle.sources)
         members = np.arange(first, start)
-        rules += [_holder(members, learning.rule.name, learning.rule.kept) for learning in bundle.rules]
+        rules += [_holder(members, learning.rule.name, learning.rule.named) for learning in bundle.rules]
         if bundle.synapse is not None:
             synapse = bundle.synapse.definition
             carriers = None if bundle.carriers is None else first + bundle.carriers
-            holder = _holder(members, synapse.name, synapse.state)
+            holder = _holder(members, synapse.name, synapse.holdable)
             synapses.append(holder._replace(outputs=(SYNAPSE.gives,), carriers=carriers))
     names = tuple(bundle.name for bundle in made.bundles)
     empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
     ends = made.sources.compact(), made.targets.compact()
     wiring = Wiring(*ends, names, tuple(rules), made.complete, empty, tuple(synapses))
     models = _models(census)
-    kept = tuple(_holder(members, model.name, model.state, model.outputs) for model, members in models)
-    lasting = tuple(_holder(members, model.name, model.state) for model, members in models)
+    kept = tuple(_holder(members, model.name, model.holdable, model.outputs) for model, members in models)
+    lasting = tuple(_holder(members, model.name, model.holdable) for model, members in models)
     return Finder(census.directory, kept, lasting, wiring, findings)
 
 

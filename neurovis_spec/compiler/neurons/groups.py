@@ -24,7 +24,7 @@ from neurovis_spec.compiler.names.state_references import no_port, no_state
 from neurovis_spec.compiler.network import Group, Input
 from neurovis_spec.compiler.neurons.labels import check_length, labels_of
 from neurovis_spec.compiler.neurons.positions import positions_of
-from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, Kind
+from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, SPIKE, Kind
 from neurovis_spec.compiler.values.arguments import (
     Each,
     Settled,
@@ -285,7 +285,7 @@ class Builder:
         result: dict[str, FloatArray] = {}
         neuron = kind.model.definition
         model_known = is_written(kind, model)  # else it is invalid, and reported
-        units = {state.name: state.unit for state in neuron.state}
+        units = {state.name: state.unit for state in neuron.holdable if state.name != SPIKE}
         states = tuple(units)
         for state, formulas in given.states:
             if model_known and state.value not in states:

@@ -15,7 +15,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Assembled, Dependent, ParameterFormula, Part, Subset
 from neurovis_spec.compiler.limits import PATIENCE, plural
-from neurovis_spec.compiler.program import RULE, SYNAPSE, Definition, Kind
+from neurovis_spec.compiler.program import RULE, SPIKE, SYNAPSE, Definition, Kind
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, value_of
 from neurovis_spec.compiler.values.definitions import Default, Defined, Definitions, check_bounds
 from neurovis_spec.compiler.values.draws import Stream
@@ -311,24 +311,35 @@ def _assembled(
     return ParameterFormula(tree, {}, known)
 
 
+_NOBODY_FIRES: Final = "no neuron fires at step 0, where runs begin"
+
+
 def as_states(given: Initial, model: Definition, findings: Findings) -> Initial:
-    """What neurons begin with, in states alone where their model has a derivative: the activity follows from these. One
-    that is a state is given by that; else there is a finding."""
-    written = given.activity
-    if written is None or not (model.flows or model.fires):
+    """What neurons begin with, in states alone where their model has a derivative or fires: the activity follows from
+    these. One that is a state is given by that; else, and where it is a spike, there is a finding."""
+    if not (model.flows or model.fires):
         return given
-    activity = model.given.each_step
-    state = next((one.name for one in model.state if isinstance(activity, Name) and one.name == activity.name), None)
+    written, activity = given.activity, model.given.each_step
+    own = [one.name for one in model.holdable if not (model.fires and one.name == SPIKE)]
+    hint = f"write initial: {{{own[0]}: …}}" if own else "leave it out"
+    for spike in (name for name, _ in given.states if model.fires and name.value == SPIKE):
+        findings.error("initial-activity", spike.span, _NOBODY_FIRES, hint)
+    states = tuple(one for one in given.states if not (model.fires and one[0].value == SPIKE))
+    if written is None:
+        return Initial(None, states)
+    state = next((name for name in own if isinstance(activity, Name) and name == activity.name), None)
     if state is None:
         message = f"the activity of the model '{model.name}' follows from its states"
-        findings.error("initial-activity", written.span, message, f"write initial: {{{model.state[0].name}: …}}")
-    elif any(name.value == state for name, _ in given.states):
+        if isinstance(activity, Name) and activity.name == SPIKE:
+            message = _NOBODY_FIRES
+        findings.error("initial-activity", written.span, message, hint)
+    elif any(name.value == state for name, _ in states):
         message = f"the activity of the model '{model.name}' is the state '{state}', which is given, too"
         findings.error("conflicting-keys", written.span, message, "leave one of them out")
     else:
         name = Located(state, Scalar(state, written.span))
-        return Initial(None, (*given.states, (name, written)))
-    return Initial(None, given.states)
+        return Initial(None, (*states, (name, written)))
+    return Initial(None, states)
 
 
 def check_initials(used: Settled, choice: Choice, constants: Constants) -> bool:
