@@ -369,6 +369,36 @@ def test_what_parameters_are_set_to_is_in_their_unit() -> None:
     ]
 
 
+GIVEN = """\
+parameters: {{lag: {{value: 1, unit: {lag}}}, often: {{value: 9, unit: {often}}}, V: {{value: 1, unit: {V}}},
+  I: {{value: 1, unit: {I}}}}}
+inputs: {{rain: {{poisson: often if t > 0.1 else 0}}}}
+models:
+  cell:
+    time: ms
+    parameters: {{C: {{value: 2, unit: nF}}, tau: {{value: 20, unit: ms}}}}
+    ports: {{kick: {{unit: mV}}}}
+    state: {{v: {{unit: mV, derivative: drive/C - v/tau, jump: kick}}}}
+    activity: v
+neurons:
+  A: {{count: 2, model: cell, input: {{kick: rain}}, initial: {{v: [V, "uniform(-V, V)"]}}}}
+  B: {{count: 2, model: cell, initial: {{v: -V}}, bias: {{drive: I, kick: 3}}}}
+connections: {{A -> B: {{pattern: one_to_one, delay: {{seconds: lag + 0.001*pre.tau}}}}}}
+"""
+
+
+def test_what_neurons_begin_with_and_are_given_is_in_their_units() -> None:
+    right = {"lag": "s", "often": "Hz", "V": "mV", "I": "nA"}
+    assert told(GIVEN.format(**right)) == []
+    for name, unit, *messages in (
+        ("lag", "ms", "lag in ms: the delay of A -> B is in s, and is set to what is in ms"),
+        ("often", "kHz", "often in kHz: the rate of rain is in 1/s, and is set to what is in kHz"),
+        ("V", "V", *["V in V: v of cell is in mV, and is set to what is in V"] * 3),
+        ("I", "pA", "I in pA: drive of cell is in nA, and is set to what is in pA"),
+    ):
+        assert told(GIVEN.format(**right | {name: unit})) == messages
+
+
 #: How a function changes where its arguments do by a factor, by how units go through it.
 DEGREES = {"same": 1.0, "compared": 0.0, "sign": 0.0, "root": 0.5}
 #: These round to whole numbers in whatever unit they are given, and so are not exact in this.

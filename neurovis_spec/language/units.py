@@ -169,9 +169,11 @@ def _made(**powers: int) -> Unit:
 
 #: What has no unit.
 NUMBER: Final = _made()
+#: That of a time where no other is said.
+SECOND: Final = _made(s=1)
 #: Units that take prefixes; of one kind that by which results are told comes first.
 _BASES: Final[Mapping[str, Unit]] = {
-    "V": _made(V=1), "A": _made(A=1), "S": _made(A=1, V=-1), "F": _made(A=1, s=1, V=-1), "s": _made(s=1),
+    "V": _made(V=1), "A": _made(A=1), "S": _made(A=1, V=-1), "F": _made(A=1, s=1, V=-1), "s": SECOND,
     "C": _made(A=1, s=1), "ohm": _made(V=1, A=-1), "Ohm": _made(V=1, A=-1), "Ω": _made(V=1, A=-1), "m": _made(m=1),
     "mol": _made(mol=1), "M": _made(tens=3, mol=1, m=-3), "W": _made(V=1, A=1), "J": _made(V=1, A=1, s=1),
     "N": _made(V=1, A=1, s=1, m=-1), "Pa": _made(V=1, A=1, s=1, m=-3), "g": _made(tens=-3, V=1, A=1, s=3, m=-2),

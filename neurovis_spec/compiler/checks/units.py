@@ -9,23 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.definitions import choices_in
+from neurovis_spec.compiler.names.references import Section
 from neurovis_spec.compiler.network import Network, Route
-from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, SYNAPSE, EndName, Kind
+from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, RULE, SYNAPSE, EndName, Kind
 from neurovis_spec.compiler.values.builtin import libraries
 from neurovis_spec.compiler.values.units import Equation, Fault, Sheet, Unequal, as_known, faults_of, sheet_of
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.dimensions import Misfit
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import ExpressionError, Tree, names
-from neurovis_spec.language.library import DefinitionModel, Library
-from neurovis_spec.language.located import Located
-from neurovis_spec.language.units import NUMBER, Unit, measured
+from neurovis_spec.language.library import DefinitionModel, Library, Parts
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.units import NUMBER, SECOND, Unit, measured
+from neurovis_spec.language.values import FormulaList
 from neurovis_spec.language.yaml.source import Scalar
 
 _KINDS: Final = (ACTIVATION, MODEL, RULE, SYNAPSE)
@@ -167,33 +171,67 @@ def _check_ports(sheet: Sheet, target: Sheet, use: Between, key: Span, findings:
             findings.warning("unit", key, f"{message} {target.told(unit)}", _hint(brought, unit))
 
 
+class _Setting(NamedTuple):
+    """What has a unit and is set to a formula where it is in use, and the units of all that it is set beside."""
+
+    name: str
+    unit: Unit
+    formula: Formula
+    written: Mapping[str, str] = MappingProxyType({})
+
+    @property
+    def equations(self) -> list[Equation]:
+        """The setting as an equation, where it is a formula."""
+        if not isinstance(self.formula.value, str) or measured(self.formula.value) is not None:
+            return []
+        try:
+            tree = parse(self.formula.value, random=True, naming="ends")
+        except ExpressionError:  # it names an instance: of its parameters nothing is known here
+            return []
+        return [Equation(self.name, "setting", self.formula, tree)]
+
+
 def _check_settings(compiled: Compiled, sheets: Sheets, findings: Findings) -> None:
-    """Warn of parameters of definitions that are set to formulas in another unit, of parameters of the spec or of a
-    module that have one."""
+    """Warn of what is set to formulas in another unit, of parameters of the spec or of a module that have one."""
     for section, _ in compiled.sections:
         labels = {name: one.measure for name, one in section.parameters.items() if one.measure}
-        for of, choice in choices_in(section) if labels else ():
-            kind = next(kind for kind in _KINDS if kind.section == of)
-            sheet = sheets.alone(kind, choice.name.value)
-            for entry in choice.settings.entries:
-                unit = sheet.known.get(entry.name) if entry.name in sheet.parts.parameters else None
-                if unit is None or not isinstance(entry.value, Scalar):
-                    continue
-                name = f"{entry.name} of {sheet.name}"
-                known = {**as_known(labels), name: unit}
-                seen = sheet._replace(known=known, written={**sheet.written, **labels})
-                for fault in faults_of(_setting(name, entry.value), known):
-                    _tell(fault, seen, findings)
+        for one in _settings(section, sheets) if labels else ():
+            known, written = {**as_known(labels), one.name: one.unit}, {**one.written, **labels}
+            seen = Sheet(MODEL, "", Parts({}, {}, None), written, known, (), ())
+            for fault in faults_of(one.equations, known):
+                _tell(fault, seen, findings)
 
 
-def _setting(name: str, node: Scalar) -> list[Equation]:
-    """What a parameter of a definition is set to, where that is a formula."""
-    if not isinstance(node.value, str) or measured(node.value) is not None:
-        return []
-    try:
-        return [Equation(name, "setting", Located(node.value, node), parse(node.value, random=True))]
-    except ExpressionError:  # it names an instance: of its parameters nothing is known here
-        return []
+def _settings(section: Section, sheets: Sheets) -> Iterator[_Setting]:
+    """What a section sets: parameters of definitions, what neurons begin with and are given, delays and rates."""
+    for of, choice in choices_in(section):
+        kind = next(kind for kind in _KINDS if kind.section == of)
+        sheet = sheets.alone(kind, choice.name.value)
+        for entry in choice.settings.entries:
+            unit = sheet.known.get(entry.name) if entry.name in sheet.parts.parameters else None
+            if unit is not None and isinstance(entry.value, Scalar) and isinstance(entry.value.value, str):
+                formula: Formula = Located(entry.value.value, entry.value)
+                yield _Setting(f"{entry.name} of {sheet.name}", unit, formula, sheet.written)
+    for group in section.neurons.values():
+        if group.model is not None:
+            yield from _given(group, sheets.alone(MODEL, group.model.name.value))
+    for key, body in section.connections:
+        if body.delay is not None and body.delay.in_seconds and isinstance(body.delay.value, Located):
+            yield _Setting(f"the delay of {shorten(key.value)}", SECOND, body.delay.value)
+    for name, model in section.inputs.items():
+        if model.poisson is not None:
+            yield _Setting(f"the rate of {name}", NUMBER / SECOND, model.poisson)
+
+
+def _given(group: GroupModel, sheet: Sheet) -> Iterator[_Setting]:
+    """What states of the neurons of a group begin with, and the bias of their ports."""
+    given = [(state.value, values) for state, values in (() if group.initial is None else group.initial.states)]
+    given += [(DRIVE if at.port is None else at.port.value, at.value) for at in group.bias or ()]
+    for name, values in given:
+        formulas = values.items if isinstance(values, FormulaList) else (values,)
+        for formula in formulas if name in sheet.known else ():
+            if isinstance(formula, Located):
+                yield _Setting(f"{name} of {sheet.name}", sheet.known[name], formula, sheet.written)
 
 
 def _different(sheet: Sheet) -> Iterator[Fault]:
