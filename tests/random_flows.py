@@ -31,9 +31,9 @@ MODELS: dict[str, Plain] = {
         "send": "rate",
     },
     "mixed": {
-        "ports": {"gain": {"combine": "product"}, "far": {"combine": "distance"}},
+        "ports": {"gain": {"combine": "product"}, "far": {"combine": "distance"}, "best": "max"},
         "state": {
-            "x": {"initial": 0.3, "derivative": "y - 0.3*x + 0.1*gain", "each_step": "clip(x, -1.5, 1.5)"},
+            "x": {"initial": 0.3, "derivative": "y - 0.3*x + 0.1*gain - 0.2*best", "each_step": "clip(x, -1.5, 1.5)"},
             "y": {"initial": -0.2, "derivative": "-x - 0.1*y*count + 0.2*far", "noise": "0.05*x"},
             "count": {"initial": 1, "each_step": "0.9*count + 0.1*drive^2", "each_episode": "1"},
         },
@@ -54,7 +54,15 @@ SENT: dict[str, list[str]] = {
 PORTS: dict[str, list[Plain]] = {
     "leaky": ["drive"],
     "rate": ["drive", "gate", {"drive": 0.5, "gate": -0.3}],
-    "mixed": ["drive", "gain", "far", {"gain": 0.7, "far": 1.2}, {"drive": -0.4, "far": 1}],
+    "mixed": [
+        "drive",
+        "gain",
+        "far",
+        "best",
+        {"best": -0.5, "drive": 1},
+        {"gain": 0.7, "far": 1.2},
+        {"drive": -0.4, "far": 1},
+    ],
     "through": ["drive"],
     "static": ["drive"],
     "leaky_integrator": ["drive"],

@@ -34,7 +34,7 @@ def specs(draw: st.DrawFn) -> Spec:
         group: dict[str, Plain] = {
             "activation": copy.deepcopy(chooser.choice(_ACTIVATIONS)),
             "model": copy.deepcopy(chooser.choice(_MODELS)),
-            "combine": chooser.choice(["sum", "sum", "sum", "distance"]),
+            "combine": chooser.choice(["sum", "sum", "sum", "distance", "max"]),
             "bias": round(chooser.uniform(-0.5, 0.5), 3),
         }
         if size > 1:

@@ -105,7 +105,7 @@ class Author:
         if choose.random() < 0.2:
             group["noise"] = choose.choice(["normal(0, 0.05)", "uniform(-0.1*a, 0.1*a)"])
         if choose.random() < 0.15:
-            group["combine"] = choose.choice(["distance", "product"])
+            group["combine"] = choose.choice(["distance", "product", "max"])
         self.states += [f"{name}.{state}" for state in _STATES.get(name_of(model), ())]
         return group
 

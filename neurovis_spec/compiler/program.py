@@ -367,6 +367,11 @@ class Port:
     #: holds these alone: positions in ``incoming``; None where there are none
     now: Indices | None = None
 
+    @property
+    def nothing(self) -> float:
+        """What is there where nothing arrives."""
+        return 1.0 if self.combine == "product" else 0.0
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Population:

@@ -199,7 +199,7 @@ def _giving_way(population: Population, state: str, begin: Beginning, connected:
 def _resting(network: Network, population: Population, port: Port) -> FloatArray:
     """What a port is where nothing arrives: its bias."""
     bias = network.neurons.bias_at(port.name)[population.members]
-    return np.asarray(bias + (1.0 if port.combine == "product" else 0.0), dtype=np.float64)
+    return np.asarray(bias + port.nothing, dtype=np.float64)
 
 
 def _shown(seconds: float, unit: str) -> str:

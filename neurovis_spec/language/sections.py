@@ -299,7 +299,7 @@ class GroupModel(Model):
     )
     combine: Annotated[Located[Combine], words(Combine)] | None = Field(
         None,
-        description="What arrives is combined by sum or product of w·a, or by distance √Σ(w·a − c)² (default sum).",
+        description="What arrives is combined by sum, product or max of w·a or by distance √Σ(w·a − c)² (default sum).",
     )
     bias: Annotated[BiasField, GROUP_DRAWN] | None = Field(
         None, description="Added to the combined input (default 0); or to several ports: {drive: 1, inhibitory: 2}."

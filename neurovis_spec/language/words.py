@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Final, Literal
 
 Direction = Literal["down", "up", "right", "left"]
-Combine = Literal["sum", "product", "distance"]
+Combine = Literal["sum", "product", "distance", "max"]
 Method = Literal["euler", "heun", "rk4", "exponential", "semi_implicit"]
 TimeUnit = Literal["s", "ms"]
 NeuronRole = Literal["input", "hidden", "output"]

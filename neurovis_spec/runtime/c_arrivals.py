@@ -105,6 +105,11 @@ def _runs(kinds: IntArray, connections: Indices, ends: IntArray) -> tuple[_Run, 
     )
 
 
+def begin_of(combine: Combine) -> Value:
+    """What is put together of signals before the first of them."""
+    return "-INFINITY" if combine == "max" else 1.0 if combine == "product" else 0.0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Incoming:
     """The connections that arrive at a port of the neurons of a population, whatever is made of them: neuron by neuron,
@@ -268,9 +273,12 @@ class Arrivals:
         self._layout = layout
 
     def start(self, place: Place) -> Value:
-        """What the sum, or product, of a neuron begins with."""
-        if self._begins is not None:
-            return self._begins(place)
+        """What the sum, the product or the greatest signal of a neuron begins with."""
+        return begin_of(self.combine) if self._begins is None else self._begins(place)
+
+    @property
+    def _nothing(self) -> float:
+        """What there is where nothing arrives."""
         return 1.0 if self.combine == "product" else 0.0
 
     def sent(self, column: _Column, edge: Place) -> str:
@@ -384,11 +392,11 @@ class Arrivals:
         connection of each is the column ``c::degree``."""
         start = self.start(place)
         if not len(self.connections):
-            return self._finished(self.code.text(start)) if self._begins is not None else start
+            return self._finished(self.code.text(start)) if self._begins is not None else self._nothing
         if isinstance(place, int):
             edges: list[Place] = list(range(int(self.ends[place]), int(self.ends[place + 1])))
             if not edges:
-                return start if isinstance(start, float) else self._finished(start)
+                return self._nothing if self._begins is None or isinstance(start, float) else self._finished(start)
             return self._terms(start, edges, [slice(None)] * len(edges), place)
         if self.runs:
             return self._in_runs(start, place)
@@ -437,6 +445,9 @@ class Arrivals:
                 code.line(f"{total} += {term};")
             case "product":
                 code.line(f"{total} *= {term};")
+            case "max":
+                signal = code.let("d", term)
+                code.line(f"if ({signal} > {total} || {signal} != {signal}) {total} = {signal};")
             case "distance":
                 centre = self._centre(self.connections[column], edge)
                 difference = code.let("d", f"{term} - {self._operand(centre)}" if centre != 0.0 else term)
@@ -471,7 +482,10 @@ class Arrivals:
         return f"({text})" if text.startswith("-") else text
 
     def _finished(self, total: str) -> Value:
-        """What a neuron gets of its sum: the root of a sum of squares, else the sum itself."""
+        """What a neuron gets of its sum: the root of a sum of squares, 0 in place of the greatest signal where there is
+        none (and of −0, which is as great), else the sum itself."""
+        if self.combine == "max" and self.finished:
+            return f"({total} == -INFINITY ? 0 : {total} + 0)"
         return f"sqrt{self.code.emitter.suffix}({total})" if self.combine == "distance" and self.finished else total
 
     def _start_of_lane(self, lanes: _Lanes, lane: int) -> Value:

@@ -48,7 +48,7 @@ from neurovis_spec.language.expressions.emit_c import INEXACT, Made, Value
 from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Conditional, Name, Number, names
 from neurovis_spec.language.words import Method
-from neurovis_spec.runtime.c_arrivals import Anew, Arrivals, Incoming
+from neurovis_spec.runtime.c_arrivals import Anew, Arrivals, Incoming, begin_of
 from neurovis_spec.runtime.c_code import Place, plus, state_name, words_of
 from neurovis_spec.runtime.c_connections import Forming, Sight, Some, own_of, taken_at
 from neurovis_spec.runtime.c_lags import write_arriving
@@ -183,7 +183,7 @@ class _Integration:
 
     def at_stage(self, part: Part, port: Port) -> Arrivals:
         """What arrives at a port at a stage: what is held, and on top of it what flows."""
-        held, start = self.plan.held.get((part.number, port.name)), 1.0 if port.combine == "product" else 0.0
+        held, start = self.plan.held.get((part.number, port.name)), begin_of(port.combine)
         anew = self.plan.reaching[part.number, port.name].anew
 
         def begins(place: Place) -> Value:

@@ -148,7 +148,7 @@ def all_sent(step: Step) -> str:
 
 def with_bias(step: Step, population: Population, port: Port, arriving: str) -> str:
     """What arrives, "" for nothing, and the bias."""
-    code, nothing = step.code, 1.0 if port.combine == "product" else 0.0
+    code, nothing = step.code, port.nothing
     biases, key = step.network.neurons.bias_at(port.name), bias_of(port.name)
     bias = biases[population.members]
     if not arriving and not code.is_set(key):
@@ -448,13 +448,16 @@ def _centres(step: Step, connections: Indices) -> str:
 
 
 def finished(port: Port, arrived: str) -> str:
-    """What arrives as one number: of squares of a distance the root."""
+    """What arrives as one number: of squares of a distance the root, and of the greatest signal 0 where there is none
+    (of which −0 and 0 are equally great)."""
+    if port.combine == "max":
+        return f"np.where({arrived} == -np.inf, 0.0, {arrived}) + 0.0"
     return f"np.sqrt({arrived})" if port.combine == "distance" else arrived
 
 
 def accumulated(step: Step, population: Population, port: Port, places: Indices, signals: str, held: str = "") -> str:
-    """The sum, the product, or the sum of the squares of signals, of the connections at these places, at each member;
-    ``held`` is that of the connections before them."""
+    """The sum, the product, the greatest, or the sum of the squares of signals, of the connections at these places, at
+    each member; ``held`` is that of the connections before them."""
     code, count = step.code, len(population.members)
     slots = port.slots[places]
     if port.combine == "distance":
@@ -466,19 +469,21 @@ def accumulated(step: Step, population: Population, port: Port, places: Indices,
         slots = np.concatenate((np.arange(count), slots))
         signals = code.let("g", f"concatenate(({held}, {signals}))")
     if port.combine == "product":
-        return _product(code, slots, count, signals)
+        return _reduced(code, slots, count, signals, "multiply", "1.0")
+    if port.combine == "max":
+        return code.let("u", _reduced(code, slots, count, signals, "np.maximum", "-np.inf"))
     return f"bincount({code.constant(np.ascontiguousarray(slots, dtype=np.intp))}, {signals}, {count})"
 
 
-def _product(code: Code, slots: Indices, count: int, signals: str) -> str:
-    """The product of what arrives at each member, 1.0 where nothing does. ``reduceat`` multiplies what lies between two
-    starts, so the signals are sorted by member, and members without any are left out."""
+def _reduced(code: Code, slots: Indices, count: int, signals: str, by: str, nothing: str) -> str:
+    """What arrives at each member, multiplied or compared, ``nothing`` where nothing does. ``reduceat`` takes what lies
+    between two starts, so the signals are sorted by member, and members without any are left out."""
     order = np.argsort(slots, kind="stable")  # equal ones keep the order of the connections
     filled, starts = np.unique(slots[order], return_index=True)
     sorted_signals = code.select(signals, order, len(order))
-    product = f"multiply.reduceat({sorted_signals}, {code.constant(starts.astype(np.intp))})"
+    reduced = f"{by}.reduceat({sorted_signals}, {code.constant(starts.astype(np.intp))})"
     if len(filled) == count:
-        return product
-    whole = code.let("u", f"np.ones({count})")
-    code.line(f"{whole}{code.position(filled, count)} = {product}")
+        return reduced
+    whole = code.let("u", f"np.full({count}, {nothing})")
+    code.line(f"{whole}{code.position(filled, count)} = {reduced}")
     return whole

@@ -309,10 +309,25 @@ def combined(combine: str, signals: Iterable[Signal]) -> float:
         for signal in signals:
             product *= signal.value
         return product
+    if combine == "max":
+        return greatest(signal.value for signal in signals)
     total = 0.0
     for _, value, centre in signals:
         total += (value - centre) * (value - centre) if combine == "distance" else value
     return math.sqrt(total) if combine == "distance" else total
+
+
+def greatest(values: Iterable[float]) -> float:
+    """The greatest of some numbers, 0 without any; it is never −0, which is as great as 0, and NaN where one is that.
+
+    >>> greatest([]), greatest([-0.0, 0.0]), greatest([-2.0, -1.0])
+    (0.0, 0.0, -1.0)
+    """
+    result = -math.inf
+    for value in values:
+        if value > result or math.isnan(value):
+            result = value
+    return 0.0 if result == -math.inf else result + 0.0
 
 
 def with_let(
