@@ -85,7 +85,7 @@ def test_defaults_stand_apart_from_the_meaning() -> None:
     assert found["connections.delay"] == ("number or expression or {seconds: …} or {matrix: …}", "1")
     assert found["time.steps"] == ("number or expression", "1000")
     assert found["neurons.activation"] == ("name or {name: {…}}", "identity")
-    assert found["neurons.combine"] == ("sum, product, distance", "sum")
+    assert found["neurons.combine"] == ("sum, product, distance, max", "sum")
     assert found["connections.self"] == ("true, false", "false")
     assert not any("(default" in key.about for key in keys())
 

@@ -46,7 +46,7 @@ SCHEMA: Mapping[type, Content] = {
     Connections: content(
         "Connections",
         "sources targets weights centres delays rules entry low high entries",
-        "descriptions learns labels routes undelayed synapses twins lags",
+        "descriptions learns labels routes undelayed synapses twins lags tied",
     ),
     Input: content("Input", "name start size expression table", "slots parts hold indexed spikes widths"),
     Output: content("Output", "name neurons scalar", "states"),
@@ -106,6 +106,8 @@ def _flows(network: Network, places: IntArray) -> Iterator[tuple[object, ...]]:
         yield "lags", network.connections.lags
     if network.connections.twins is not None:
         yield "twins", network.connections.twins
+    if network.connections.tied is not None:
+        yield "tied", network.connections.tied
     if (by := network.integration) is not None:
         yield "integrate", by.method, by.substeps
         if held := sorted(one.name for one in network.inputs if one.hold):

@@ -16,7 +16,7 @@ from neurovis_spec.compiler.canonical import content_hash
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.definitions import check_dt, check_slopes, check_slopes_through, integrated
 from neurovis_spec.compiler.checks.warnings import warn
-from neurovis_spec.compiler.connections.connect import Connected, connect, join
+from neurovis_spec.compiler.connections.connect import Connected, connect, join, tying
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
@@ -226,7 +226,7 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
         outputs=sections.outputs,
         populations=populations,
         projections=projected.projections,
-        program=make_program(populations, projected, sections.order, declared.integration),
+        program=make_program(populations, projected, sections.order, declared.integration, tying(connections)),
         layout=sections.layout,
         render=sections.render,
         hash="",  # of all the rest

@@ -38,6 +38,7 @@ from neurovis_spec.compiler.program import (
     Receive,
     Send,
     SendAhead,
+    Tie,
     Update,
     Use,
 )
@@ -54,7 +55,11 @@ class Integration(NamedTuple):
 
 
 def make_program(
-    populations: tuple[Population, ...], projected: Projected, order: Order, by: Integration
+    populations: tuple[Population, ...],
+    projected: Projected,
+    order: Order,
+    by: Integration,
+    tied: Iterable[Tie] = (),
 ) -> tuple[Operation, ...]:
     """What a step does, in order: inputs, neurons along delay 0, signals that leave, rules. Where states flow they are
     integrated behind the neurons that reach a derivative without delay and do not flow themselves."""
@@ -74,6 +79,7 @@ def make_program(
         *behind,
         Send(),
         *learning,
+        *tied,
     )
     return receiving(program, projected.projections, projected.targets)
 

@@ -169,7 +169,8 @@ class Connections:
     entries: tuple[str, ...]
     #: what the spec says of each entry
     descriptions: tuple[str | None, ...]
-    #: the rule of each entry as the author wrote it, for display (``delta(rate=0.01)``); None without one
+    #: the rule of each entry as the author wrote it, for display (``delta(rate=0.01)``), or whose weights it has; None
+    #: without either
     learns: tuple[str | None, ...]
     #: what each entry is called in pictures
     labels: tuple[str | None, ...]
@@ -186,9 +187,29 @@ class Connections:
     #: of each connection whose delay is continuous, so that what it brings to a derivative is read between steps, that
     #: delay in steps, else NaN; None where there are none
     lags: FloatColumn | None = None
+    #: of each connection of an entry whose weights are those of another one which connection of that it is, else −1;
+    #: None where there are none
+    tied: IntColumn | None = None
 
     def __len__(self) -> int:
         return len(self.sources)
+
+    @property
+    def learning(self) -> BoolArray:
+        """Which connections have a rule of their own: the weights of those that are tied are those of others."""
+        own = np.asarray(self.rules.whole() >= 0)
+        return own if self.tied is None else own & (self.tied.whole() < 0)
+
+    def with_tied(self, some: IntArray) -> tuple[IntArray, IntArray]:
+        """All connections that have a weight of some of them, and whose of these each has, by its place."""
+        if self.tied is None or not len(some):
+            return some, np.arange(len(some), dtype=np.int64)
+        tied = self.tied.whole()
+        owners = np.where(tied >= 0, tied, np.arange(len(tied)))
+        order = np.argsort(owners[some], kind="stable")
+        place = np.minimum(np.searchsorted(owners[some][order], owners), len(some) - 1)
+        members = np.flatnonzero(owners[some][order[place]] == owners)
+        return members, order[place[members]]
 
     def with_twins(self, some: IntArray) -> IntArray:
         """Some connections, and the twins of those that have one, ascending where there are any."""
@@ -672,7 +693,7 @@ class Network:
         for binding in self.set_by_events:
             if binding.weights:
                 can[binding.indices] = True
-        return frozen(np.flatnonzero(can).astype(np.int64))
+        return frozen(self.connections.with_tied(np.flatnonzero(can).astype(np.int64))[0])
 
     @cached_property
     def connection_names(self) -> tuple[str, ...]:

@@ -553,3 +553,12 @@ class Learn(Operation):
 
     projection: int
     phases: tuple[Phase, ...] = PHASES
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tie(Operation):
+    """Weights that are those of other connections, behind the rules of these: ``connections`` have them ``of``
+    others."""
+
+    connections: IntArray
+    of: IntArray

@@ -94,6 +94,7 @@ from neurovis_spec.language.values import (
     RulesField,
     SetField,
     SynapseField,
+    WeightField,
     at_ports,
     pair,
 )
@@ -379,6 +380,12 @@ _WHICH: Final = (
 )
 
 
+#: Of an entry whose weights are those of another one.
+_TIED: Final = NotWith(
+    (AsTable("weight"),), "'{own}' beside weights that are those of another entry, which says what '{own}' would say"
+)
+
+
 class ConnectionModel(Model):
     """The body of a connection; a bare weight is read as ``{weight: …}``."""
 
@@ -391,27 +398,31 @@ class ConnectionModel(Model):
     }
 
     weight: Annotated[
-        FormulaField | None,
+        WeightField | None,
         PAIR,
         NotWith(
             ("matrix", "edges"),
             "'{own}' beside '{other}', in which each connection has a weight of its own",
             "write the weights into '{other}'; an edge is [FROM, TO, WEIGHT, DELAY]",
         ),
-    ] = Field(None, description="One number, or an expression of i, j, n_from, n_to (default 1).")
+    ] = Field(
+        None, description="One number, or an expression of i, j, n_from, n_to (default 1); or {transpose: A -> B}."
+    )
     centre: Annotated[CentreField, PAIR] | None = Field(
         None, description="For combine: distance; like weight or matrix (default 0)."
     )
-    scale: ScaleModel | None = Field(None, description="Scales the weights of this entry together when they are made.")
+    scale: Annotated[ScaleModel | None, _TIED] = Field(
+        None, description="Scales the weights of this entry together when they are made."
+    )
     matrix: MatrixField | None = Field(None, description="Dense rows, rows are sources; null means no connection.")
     edges: Annotated[EdgesField | None, NotWith(("matrix", _CENTRE), _WHICH)] = Field(
         None, description="[[from, to, weight, delay], …], the last two optional."
     )
-    pattern: Annotated[PatternField | None, NotWith(("matrix", "edges", _CENTRE), _WHICH)] = Field(
+    pattern: Annotated[PatternField | None, NotWith(("matrix", "edges", _CENTRE), _WHICH), _TIED] = Field(
         None,
         description="Which pairs are connected: all_to_all, one_to_one, chain, ring, {random: {probability: p}}, ….",
     )
-    where: Annotated[FormulaField | None, WHICH, NotWith(("matrix", "edges", _CENTRE), _WHICH)] = Field(
+    where: Annotated[FormulaField | None, WHICH, NotWith(("matrix", "edges", _CENTRE), _WHICH), _TIED] = Field(
         None,
         description="Which pairs, of a pattern or of all, there are: an expression of i, j, distance, …, true or not.",
     )
@@ -422,6 +433,7 @@ class ConnectionModel(Model):
             "'self' says what a pattern may do; here every connection is written",
             code="useless-key",
         ),
+        _TIED,
     ] = Field(None, description="Whether a neuron may connect to itself in a pattern (default false).")
     rows: Annotated[
         Annotated[Located[str], words("from", "to")] | None,
@@ -441,12 +453,19 @@ class ConnectionModel(Model):
     synapse: SynapseField | None = Field(
         None, description="What it brings to its port, in place of weight times what is sent: name, or {name: {…}}."
     )
-    symmetric: BoolField | None = Field(
+    symmetric: Annotated[BoolField | None, _TIED] = Field(
         None,
         description="Whether each connection is followed by one back with the same numbers, drawn as one line with it "
         "(default false).",
     )
-    plasticity: RulesField = Field(
+    plasticity: Annotated[
+        RulesField,
+        NotWith(
+            (AsTable("weight"),),
+            "'plasticity' beside weights that are those of another entry, whose rule changes them",
+            "let the entry that is named learn",
+        ),
+    ] = Field(
         default=(), description="A rule: name, or {name: {parameter: value, signal: …}}; or several, in their order."
     )
     bounds: Annotated[

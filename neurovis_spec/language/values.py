@@ -14,6 +14,7 @@ from pydantic import Field, ValidationInfo
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.grammar import (
     BOOL,
+    ENDS,
     FORMULA,
     FORMULAS,
     GROUP,
@@ -219,6 +220,41 @@ _DELAY: Final = Map(
     },
     one=True,
 )
+
+
+class Tie(NamedTuple):
+    """``{same_as: A -> B}`` or ``{transpose: A -> B}``: the weights of an entry are those of another one, connection by
+    connection, or with sources as targets."""
+
+    entry: Located[str]
+    transposed: bool
+
+    @property
+    def span(self) -> Span:
+        """Where the other entry is named."""
+        return self.entry.span
+
+
+_OTHER: Final = Plain({"type": "string", "pattern": "->"}, ENDS)
+_TIE: Final = Map(
+    {
+        "same_as": Key(_OTHER, "The entry whose weights these are, connection by connection."),
+        "transpose": Key(_OTHER, "The entry whose weights these are, its sources as targets."),
+    },
+    one=True,
+)
+
+
+def as_weight(node: Node, info: ValidationInfo) -> Formula | Tie:
+    """A formula, or whose weights they are."""
+    if not isinstance(node, Mapping):
+        return as_formula(node, info)
+    keys = read_keys(node, _TIE.known, findings_of(info)).mapping
+    entry = sole(keys, "way to tie weights", "write {same_as: FROM -> TO} or {transpose: FROM -> TO}", info)
+    return Tie(as_text(entry.value, info), entry.name == "transpose") if entry.name in _TIE.known else give_up()
+
+
+WeightField = Annotated[Formula | Tie, Leaf(as_weight, Either((FORMULA, _TIE)), True)]
 
 
 class Delay(NamedTuple):

@@ -134,7 +134,7 @@ class Rule:
 def rules(network: Network) -> tuple[Rule, ...]:
     """The rules in the order of the spec; what one reference names has one."""
     connections = network.connections
-    known, learning = names_of(network), np.flatnonzero(connections.rules.whole() >= 0)
+    known, learning = names_of(network), np.flatnonzero(connections.learning)
     entry = connections.entry[learning]
     found: dict[str, tuple[list[str], IntArray]] = {}
     for number, (name, written) in enumerate(zip(connections.entries, connections.learns, strict=True)):

@@ -46,6 +46,7 @@ from neurovis_spec.compiler.program import (
     ReadInputs,
     Receive,
     Send,
+    Tie,
     Update,
     Use,
 )
@@ -857,6 +858,16 @@ class StepCode:
             left_out = f"cut[{connection}] || {total} == 0"
             code.line(f"formed[{connection}] = {left_out} ? {zero} : {value}*(weights[{connection}]/{total});")
 
+    def tie(self, operation: Tie) -> None:
+        """The weights of tied connections, behind the rules of those that they are of."""
+        code = self.code
+        for place in range(len(operation.of)) if self.form.written_out else ():
+            code.line(f"weights[{operation.connections[place]}] = weights[{operation.of[place]}];")
+        if not self.form.written_out:
+            code.line(code.loop("q", len(operation.of)))
+            own, other = (code.at(one, "q") for one in (operation.connections, operation.of))
+            code.line(f"    weights[{own}] = weights[{other}];")
+
     def learn(self, operation: Learn) -> None:
         """The rule of a projection: in a loop several connections side by side, then one by one those that are left.
         The sums ``o`` are put together behind the loop, so that no addition waits for the one before."""
@@ -1085,3 +1096,8 @@ def _send(operation: Send, step: StepCode) -> None:
 @write.register
 def _learn(operation: Learn, step: StepCode) -> None:
     step.learn(operation)
+
+
+@write.register
+def _tie(operation: Tie, step: StepCode) -> None:
+    step.tie(operation)

@@ -45,6 +45,7 @@ from neurovis_spec.compiler.program import (
     Receive,
     Send,
     SendAhead,
+    Tie,
     Update,
     Use,
 )
@@ -362,3 +363,11 @@ def seen_at(step: Step, projection: Projection) -> dict[str, str]:
     """Arrays for pre, sent, post and the signals; only what the definitions read is gathered."""
     seen = behind_lags(step, projection)
     return seen | ends_at(step, projection, projection.read - seen.keys())
+
+
+@emit.register
+def _tie(operation: Tie, step: Step) -> None:
+    """The weights of tied connections, behind the rules of those that they are of."""
+    code, count = step.code, len(step.network.connections)
+    taken = code.select("weights", operation.of, count)
+    code.line(f"weights{code.position(operation.connections, count)} = {taken}")

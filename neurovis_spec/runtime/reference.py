@@ -32,6 +32,7 @@ from neurovis_spec.compiler.program import (
     Receive,
     Send,
     SendAhead,
+    Tie,
     Update,
     Use,
 )
@@ -375,3 +376,9 @@ def _send(operation: Send, by: ReferenceStepper, state: State, inputs: FloatArra
 @perform.register
 def _learn(operation: Learn, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
     by.learn(operation, state, inputs)
+
+
+@perform.register
+def _tie(operation: Tie, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    for connection, other in zip(operation.connections.tolist(), operation.of.tolist(), strict=True):
+        state.weights[connection] = state.weights[other]

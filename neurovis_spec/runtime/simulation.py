@@ -430,7 +430,7 @@ class Simulation:
         """Carry out the rules of connections (``K -> O``) from step k on, or stop them: weights and states of rules
         stay as they are then. Raises KeyError; TypeError where ``on`` is neither True nor False."""
         _, members = self._parts(connections)
-        if not len(members) or not (self.network.connections.rules[members] >= 0).any():
+        if not len(members) or not self.network.connections.learning[members].any():
             raise UnknownNameError(f"there is no rule at '{connections}'")
         self._controls.learn(self._state, members, arguments.truth("on", on))
 

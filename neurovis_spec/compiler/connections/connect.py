@@ -6,9 +6,10 @@ matrix or pattern row by row), and for each plastic entry what it learns by.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,22 +20,26 @@ from neurovis_spec.arrays import (
     Indices,
     IntArray,
     IntColumn,
+    frozen,
     integers,
     narrow,
     reals,
 )
 from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, EntryContext
 from neurovis_spec.compiler.connections.plasticity import called, title_of
+from neurovis_spec.compiler.connections.ties import Original
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, arrow_of, resolve_sum
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Connections
 from neurovis_spec.compiler.neurons.populate import Census
+from neurovis_spec.compiler.program import Tie
 from neurovis_spec.compiler.taken import Wired
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.sections import written
+from neurovis_spec.language.sections import ConnectionModel, written
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
+from neurovis_spec.language.values import Tie as TiedWeight
 
 
 @dataclass(frozen=True)
@@ -129,23 +134,71 @@ def connect(scopes: tuple[Scope, ...], census: Census, limits: Limits, seed: int
         section, findings = scope.section, scope.constants.findings
         if "connections" in section.unknown or written(section.source) > len(section.connections):
             failed.add(scope.module)
-        number: dict[str, int] = {}
-        for key, body in section.connections:
-            before = findings.errors
-            name, sources, targets = _ends(key, directory, findings)
-            number[name] = number.get(name, 0) + 1
-            if number[name] > 1:
-                name = f"{name} ({number[name]})"
-            if body.contradictory:  # which key is meant is not known: nothing is held against the sizes of the ends
-                sources = targets = UNKNOWN
-            around = EntryContext(scope, directory, census, limits, seed, limits.connections - total)
-            bundle = EntryBuilder(around, key, body, name, sources, targets).build()
-            if bundle is UNKNOWN or findings.errors > before:
+        named = list(_named(section.connections, directory, findings))
+        made: dict[int, Bundle] = {}
+        originals: dict[str, Original | Unknown | None] = {one.name: None for one in named if one.tied}
+        # what is tied to another entry is made behind all that have weights of their own
+        for place in sorted(range(len(named)), key=lambda place: named[place].tied):
+            entry, before = named[place], findings.errors
+            room = limits.connections - total
+            around = EntryContext(scope, directory, census, limits, seed, room, originals)
+            bundle = EntryBuilder(around, *entry).build()
+            sound = bundle is not UNKNOWN and findings.errors == before
+            if not entry.tied:
+                originals[entry.name] = _original(entry, bundle) if sound else UNKNOWN
+            if bundle is UNKNOWN or not sound:
                 failed.add(scope.module)
             else:
                 total += len(bundle.sources)
-                result.append(bundle)
+                made[place] = bundle
+        result += (made[place] for place in sorted(made))
     return Connected(tuple(result), not failed)
+
+
+class _Entry(NamedTuple):
+    """An entry as it is written, what it is called in its scope, and the neurons of its ends."""
+
+    key: Located[str]
+    body: ConnectionModel
+    name: str
+    sources: Indices | Unknown
+    targets: Indices | Unknown
+
+    @property
+    def tied(self) -> bool:
+        """Whether its weights are those of another one."""
+        return isinstance(self.body.weight, TiedWeight)
+
+
+def _named(
+    entries: Iterable[tuple[Located[str], ConnectionModel]], directory: Directory, findings: Findings
+) -> Iterator[_Entry]:
+    """The entries of a scope with their names."""
+    number: dict[str, int] = {}
+    for key, body in entries:
+        name, sources, targets = _ends(key, directory, findings)
+        number[name] = number.get(name, 0) + 1
+        if number[name] > 1:
+            name = f"{name} ({number[name]})"
+        if body.contradictory:  # which key is meant is not known: nothing is held against the sizes of the ends
+            sources = targets = UNKNOWN
+        yield _Entry(key, body, name, sources, targets)
+
+
+def _original(entry: _Entry, bundle: Bundle | Unknown) -> Original | Unknown:
+    """An entry as others may be tied to it."""
+    if bundle is UNKNOWN or entry.sources is UNKNOWN or entry.targets is UNKNOWN:
+        return UNKNOWN
+    return Original(
+        name=bundle.name,
+        ends=(entry.sources, entry.targets),
+        sources=bundle.sources,
+        targets=bundle.targets,
+        weights=bundle.weights,
+        parts=bundle.parts,
+        learns=bundle.learns,
+        symmetric=bundle.symmetric,
+    )
 
 
 def _ends(
@@ -164,6 +217,10 @@ def join(made: Connected, rules: Sequence[Indices], lagging: BoolArray | None = 
     """All entries as one structure of columns; ``rules`` has for each entry the Projection of each connection, or −1,
     and ``lagging`` says which connections have a continuous delay, if any."""
     bundles, sizes = made.bundles, made.sizes
+    tied = _tied(bundles)
+    if tied is not None:  # what is tied changes as the rule of the other says
+        whole = integers(*rules).whole()
+        rules = [np.where(tied >= 0, whole[tied], whole)]
     synapses = tuple(None if one.synapse is None else called(one.synapse) for one in bundles)
     lags = None
     if lagging is not None and made.exact is not None:
@@ -180,14 +237,38 @@ def join(made: Connected, rules: Sequence[Indices], lagging: BoolArray | None = 
         high=Column.repeated(np.array([bundle.high for bundle in bundles]), sizes, np.float64),
         entries=tuple(bundle.name for bundle in bundles),
         descriptions=tuple(bundle.description for bundle in bundles),
-        learns=tuple(title_of(bundle.rules) or None for bundle in bundles),
+        learns=tuple(title_of(one.rules) or (None if one.tied is None else one.tied.shown) for one in bundles),
         labels=tuple(bundle.label for bundle in bundles),
         routes=() if all(route == PLAIN_ROUTE for route in made.wired.routes) else tuple(made.wired.routes),
         undelayed=tuple(number for number, bundle in enumerate(bundles) if bundle.undelayed),
         lags=lags,
         twins=_twins(bundles),
         synapses=synapses if any(synapses) else (),
+        tied=None if tied is None else integers(tied),
     )
+
+
+def tying(connections: Connections) -> Iterator[Tie]:
+    """What has the tied weights of a network follow those that rules change."""
+    if connections.tied is not None:
+        tied = connections.tied.whole()
+        changing = np.flatnonzero((tied >= 0) & np.asarray(connections.rules.whole() >= 0))
+        if len(changing):
+            yield Tie(frozen(changing), frozen(tied[changing]))
+
+
+def _tied(bundles: Sequence[Bundle]) -> IntArray | None:
+    """Of every connection the one whose weight it has, −1 where that is its own; None where it is so of all."""
+    if all(one.tied is None for one in bundles):
+        return None
+    starts = np.cumsum([0, *(len(one.sources) for one in bundles)])
+    start_of = {one.name: int(start) for one, start in zip(bundles, starts, strict=False)}
+    own = (np.full(len(one.sources), -1, dtype=np.int64) for one in bundles)
+    places = (
+        none if one.tied is None else start_of[one.tied.original.name] + one.tied.places
+        for one, none in zip(bundles, own, strict=True)
+    )
+    return np.concatenate([*places])
 
 
 def _twins(bundles: Sequence[Bundle]) -> IntColumn | None:

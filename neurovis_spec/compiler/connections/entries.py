@@ -30,6 +30,7 @@ from neurovis_spec.compiler.connections.routes import default_delays, route_of
 from neurovis_spec.compiler.connections.shared import carriers_in, check_shared
 from neurovis_spec.compiler.connections.signals import ConnectionEnds, Place
 from neurovis_spec.compiler.connections.spikes import SpikeCheck
+from neurovis_spec.compiler.connections.ties import Entries, Tied, tied_to
 from neurovis_spec.compiler.connections.twins import both_ways, doubled, in_turn, one_of_each
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Part
@@ -39,7 +40,7 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
 from neurovis_spec.compiler.neurons.labels import check_length
 from neurovis_spec.compiler.neurons.populate import Census
-from neurovis_spec.compiler.program import DRIVE, SYNAPSE, Definition
+from neurovis_spec.compiler.program import DRIVE, RULE, SYNAPSE, Definition
 from neurovis_spec.compiler.values.arguments import Each, Settled, check_initials, settled_of
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.draws import Stream
@@ -53,7 +54,7 @@ from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.tables import EdgeFile, FileReference, columns_of_edges, edge_column
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
-from neurovis_spec.language.values import Delay, MatrixRows
+from neurovis_spec.language.values import Delay, MatrixRows, Tie
 from neurovis_spec.language.words import Combine
 from neurovis_spec.language.yaml.source import Mapping, Scalar
 
@@ -107,6 +108,13 @@ class Bundle(NamedTuple):
     uses: tuple[InUse, ...] = ()
     #: where the synapse is shared, for each connection the one of the entry that carries its states; else None
     carriers: IntArray | None = None
+    #: where the weights are those of another entry, of which connection each of them is the weight; else None
+    tied: Tied | None = None
+
+    @property
+    def learns(self) -> bool:
+        """Whether a rule changes its weights."""
+        return any(one.rule.given.name == RULE.gives for one in self.rules)
 
     def twinned(self) -> Bundle:
         """The same with each connection directly followed by its twin, which has its numbers."""
@@ -144,6 +152,8 @@ class _Shape(NamedTuple):
     columns: EdgeColumns | None = None
     #: the number of each connection among those of its pair
     copy: int | Indices = 0
+    #: the entry that has the weights
+    tied: Tied | None = None
 
     @property
     def has_delay(self) -> BoolArray:
@@ -171,6 +181,8 @@ class EntryContext(NamedTuple):
     limits: Limits
     seed: int
     room: int
+    #: the entries that weights may be tied to
+    originals: Entries
 
 
 @dataclass(frozen=True)
@@ -279,6 +291,7 @@ class EntryBuilder:
         if not len(shape.i):  # without connections there is nothing that they would do
             rules, synapse = (), None
         learns = {name: any(one.rule.given.name == name for one in rules) for name in ("weight", "centre")}
+        learns["weight"] |= shape.tied is not None and shape.tied.original.learns
         bundle = Bundle(
             name=self.context.scope.called(self.name),
             key=self.key.span,
@@ -303,6 +316,7 @@ class EntryBuilder:
             undelayed=written is None and not np.all(np.asarray(unsaid) | shape.has_delay),
             timing=None if delays.exact is None else delays,
             synapse=synapse,
+            tied=shape.tied,
         )
         return self._in_use(bundle.twinned() if self.symmetric else bundle)
 
@@ -361,6 +375,9 @@ class EntryBuilder:
         """Say that there are no connections: an error, but for those that are drawn, counted or chosen by a condition,
         as validity depends on no seed and no parameter."""
         pattern, where, findings = self.body.pattern, self.body.where, self.constants.findings
+        if isinstance(self.body.weight, Tie):
+            findings.warning("nothing-drawn", self.key.span, "the entry that has the weights makes no connection", None)
+            return
         if where is not None:
             hint = "i and j count from 0; a neuron is connected to itself with self: true alone"
             findings.warning("nothing-drawn", where.span, "of no pair 'where' holds", hint)
@@ -416,6 +433,8 @@ class EntryBuilder:
         with self.constants.following() as cell_parts:
             grid = UNKNOWN if body.matrix is None else self._grid(body.matrix, "weight")
         edges = UNKNOWN if body.edges is None else self._edges()
+        if isinstance(body.weight, Tie):
+            return self._tied_to(body.weight)
         pattern = UNKNOWN if body.pattern is None else self._pattern()
         where = UNKNOWN if body.where is None or body.pattern is not None else self._where(body.where)
         if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._is_sound(*_SHAPING):
@@ -433,6 +452,16 @@ class EntryBuilder:
                 return UNKNOWN
             return _cells_of(centre.present, centre.values)._replace(weights=None)
         return pattern if body.pattern is not None else self._all_pairs() if body.where is None else where
+
+    def _tied_to(self, tie: Tie) -> _Shape | Unknown:
+        """The pairs of the entry that has the weights, with these."""
+        tied = tied_to(tie, (self.sources, self.targets), self.context.originals, self.constants.findings)
+        if tied is UNKNOWN:
+            return UNKNOWN
+        inverse, other = np.argsort(tied.places), tied.original
+        parts = (part for part in other.parts if part.field in ("weights", "initial_weights"))
+        moved = tuple(_moved_to(part, inverse[part.within(len(inverse))]) for part in parts)
+        return _Shape(tied.i, tied.j, other.weights[tied.places], None, moved, tied=tied)
 
     def _ends(self) -> Ends | Unknown:
         if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._is_sound("self"):
@@ -599,7 +628,7 @@ class EntryBuilder:
 
     def _plain_weights(self, shape: _Shape | Unknown) -> FloatArray | Unknown:
         """The weights before they are scaled."""
-        if self.body.weight is not None:
+        if self.body.weight is not None and not isinstance(self.body.weight, Tie):
             return self._values(self.body.weight, shape, "weight")
         if shape is UNKNOWN:
             return UNKNOWN

@@ -82,7 +82,7 @@ class _Making:
         if isinstance(weights.value, FormulaList):
             yield from self._each_weight(weights, weights.value)
             return
-        members = self.connections.with_twins(weights.members)
+        members, _ = self.connections.with_tied(self.connections.with_twins(weights.members))
         known = weights.name, members.tobytes()
         if known not in self._of_weights:
             slot = self._of_weights[known] = self._slot(weights.name)
@@ -116,6 +116,9 @@ class _Making:
             each: FloatArray | Dependent = Subset(Assembled(base, tuple(parts)), order) if parts else base[order]
         else:
             each = Assembled(base, tuple(parts)) if parts else base
+        if self.connections.tied is not None:
+            members, whose = self.connections.with_tied(members)
+            each = each[whose] if isinstance(each, np.ndarray) else Subset(each, whose)
         self._bind(ParameterFormula(Name("weights"), {"set": trigger}, {"weights": each}), members)
 
     def _feed(self, feed: Feed) -> Iterator[Assigned]:
