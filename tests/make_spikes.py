@@ -47,6 +47,15 @@ connections:
 ADEX: Final = (
     "neurovis: 1\nname: adex\ntime: {dt: 0.01 ms}\nros: {rate: 100}\nneurons: {N: {model: adex, bias: 1000}}\n"
 )
+#: Hodgkin and Huxley's cell with five drives, of which the first does not fire for long; METHOD is rk4 or exponential.
+HODGKIN_HUXLEY: Final = """neurovis: 1
+name: squid
+time: {dt: 0.01 ms, steps: 5001, integrate: METHOD}
+ros: {rate: 100}
+neurons: {N: {count: 5, model: hodgkin_huxley, bias: [6, 8, 10, 20, 40]}}
+"""
+#: What Brian2 calls these methods.
+METHODS: Final = {"rk4": "rk4", "exponential": "exponential_euler"}
 #: The steps, of a millisecond, in which three sources and their targets fire.
 PRE: Final = [
     [3, 20, 21, 60, 110, 111, 112, 180],
@@ -88,6 +97,7 @@ def main() -> None:
         "coba_1": conductance_network(brian2, nv.compile_text(COBA.replace("DELAY", "1")), 1),
         "coba_0": conductance_network(brian2, nv.compile_text(COBA.replace("DELAY", "0")), 0),
         **adex(brian2),
+        **hodgkin_huxley(brian2),
         "stdp": timing(
             brian2,
             "da/dt = -a/(20*ms) : 1 (clock-driven)\ndb/dt = -b/(20*ms) : 1 (clock-driven)",
@@ -184,6 +194,33 @@ def adex(b: ModuleType) -> dict[str, Array]:
     b.Network(cell, spikes, states).run(300 * b.ms)
     steps = np.rint(np.asarray(spikes.t / b.defaultclock.dt)).astype(np.int64) + 1
     return {"adex": steps, "adex_states": np.stack([states.v[0], states.w[0]])}
+
+
+def hodgkin_huxley(b: ModuleType) -> dict[str, Array]:
+    """By each method the steps and neurons, (spikes, 2), of HODGKIN_HUXLEY in 50 ms, and v at every hundredth step."""
+    b.defaultclock.dt = 0.01 * b.ms
+    found = dict[str, Array]()
+    for ours, theirs in METHODS.items():
+        b.start_scope()
+        cells = b.NeuronGroup(
+            5,
+            """dv/dt = (drive - 120*m*m*m*h*(v - 50) - 36*n*n*n*n*(v + 77) - 0.3*(v + 54.387))/ms : 1
+            dm/dt = (1/exprel(-(v + 40)/10)*(1 - m) - 4*exp(-(v + 65)/18)*m)/ms : 1
+            dh/dt = (0.07*exp(-(v + 65)/20)*(1 - h) - h/(1 + exp(-(v + 35)/10)))/ms : 1
+            dn/dt = (0.1/exprel(-(v + 55)/10)*(1 - n) - 0.125*exp(-(v + 65)/80)*n)/ms : 1
+            drive : 1""",
+            threshold="v >= 0",
+            refractory="v >= 0",
+            method=theirs,
+        )
+        cells.v, cells.m, cells.h, cells.n, cells.drive = -65, 0.0529, 0.5961, 0.3177, [6, 8, 10, 20, 40]
+        spikes, states = b.SpikeMonitor(cells), b.StateMonitor(cells, "v", record=True, dt=1 * b.ms)
+        b.Network(cells, spikes, states).run(50 * b.ms)
+        steps = np.rint(np.asarray(spikes.t / b.defaultclock.dt)).astype(np.int64) + 1
+        order = np.lexsort((np.asarray(spikes.i), steps))
+        found[f"squid_{ours}"] = np.stack([steps, np.asarray(spikes.i)], axis=1)[order].astype(np.uint16)
+        found[f"squid_{ours}_v"] = np.asarray(states.v).T
+    return found
 
 
 def generators(b: ModuleType, trains: list[list[int]]) -> object:
