@@ -7,13 +7,14 @@ forms of the step, a plain one and one that looks after everything.
 Whole runs of large networks have a third form, the *fused* one: a signal that arrives after one step along a weight
 that does not change is not stored; the neuron that it arrives at takes it from the activities of the step *before*. The
 weights of such connections are *packed* at the beginning of a call, in the order in which neurons read them; at its
-end their last signals *leave*, into the array where every other form looks for them.
+end their last signals *leave*, into the array where every other form looks for them. There, states of connections that
+are the same for many are kept *once* (``runtime/kept_once.py``), where they are the same when a call begins.
 """
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 from weakref import WeakKeyDictionary
@@ -23,15 +24,16 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Definition
+from neurovis_spec.compiler.program import Definition, Key
 from neurovis_spec.compiler.values.spikes import always_finite
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.language.expressions.functions import Library
 from neurovis_spec.language.expressions.tree import Name
-from neurovis_spec.runtime import c_flows, c_functions, c_library, c_plan
+from neurovis_spec.runtime import c_flows, c_functions, c_library, c_once, c_plan
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, state_name, words_of
 from neurovis_spec.runtime.c_step import Built, StepCode, begins_otherwise, is_watched
+from neurovis_spec.runtime.kept_once import Once, kept_once
 from neurovis_spec.runtime.lags import ring_lengths
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import Conditions, Mask, State, Structure
@@ -53,9 +55,9 @@ _NEVER: Final = 1 << 62
 #: ``nv_state``: of a State ``activity``, ``weights``, ``signals``, ``history``, ``outlets``, and ``cells``, one pointer
 #: for each state or output of a model or a rule; ``x``: the numbers that can be set; ``parameters``; ``s``: the inputs
 #: of the step; ``reads``: of each input whether the step computes it by its expression; ``held``, ``holding``,
-#: ``lesioned``, ``gone``, ``cut``, ``still``, ``lost``, ``before``, ``packed``: as ``Form`` says; ``given``: the tables
-#: that are too long for the text; ``work``: what an integration keeps, and arrays of what arrives. ``k`` and ``form``:
-#: the step that ``nv_once`` makes, and its form.
+#: ``lesioned``, ``gone``, ``cut``, ``still``, ``lost``, ``before``, ``packed``: as ``Form`` says; ``once``: what is
+#: kept once for many connections; ``given``: the tables that are too long for the text; ``work``: what an integration
+#: keeps, and arrays of what arrives. ``k`` and ``form``: the step that ``nv_once`` makes, and its form.
 #:
 #: ``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; the inputs of
 #: each are a row of ``rows``, but for those that the step computes, which it puts there. Steps that ``every`` divides
@@ -63,7 +65,8 @@ _NEVER: Final = 1 << 62
 #: for them), which lie next to each other if ``beside``; and one of ``states``, with the ``columns`` numbers that
 #: ``probed`` points to, of which signals of synapses stand in ``formed``; where rules change weights that these read,
 #: those of the step are kept in ``weighed``.
-#: With ``look`` it ends behind the first step after which something is not finite.
+#: With ``look`` it ends behind the first step after which something is not finite; ``fused``: whether steps may be made
+#: in the fused form, as where nothing reads states that are kept once in it.
 _HEAD: Final = """#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -82,12 +85,12 @@ typedef struct {
     const int64_t *lost;
     const void *const *given;
     double *const *cells;
-    double *before, *packed, *work;
+    double *before, *packed, *once, *work;
     int64_t k, form, fresh;
 } nv_state;
 
 typedef struct {
-    int64_t k, steps, every, form, then, look, beside, changes, columns;
+    int64_t k, steps, every, form, then, look, fused, beside, changes, columns;
     double *rows, *activity, *weights, *states, *formed, *weighed;
     const int64_t *changing;
     const double *const *probed;
@@ -128,9 +131,10 @@ NV_PUBLIC int64_t nv_once(nv_state *p)
 NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
 {
     double *s = c->rows, *activity = c->activity, *weights = c->weights, *states = c->states;
-    const int fused = FUSED && c->then == 0 && c->steps > 3;
+    // in the fused form from the step ``begin`` on, with what is kept once where it is the same for all
+    int fused = FUSED && c->fused && c->then == 0 && c->steps > 3, once = 0, follows = 0;
+    const int64_t begin = PACKED || c->form;
     int64_t made = 0;
-    int follows = 0;
     if (fused)
         nv_pack(p);
     int64_t wait = (c->every - c->k % c->every) % c->every;
@@ -150,9 +154,13 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         }
         wait--;
         const int64_t form = i ? c->then : c->form;
+        if (ONCE && fused && i == begin) {
+            fused = once = (int)nv_gather(p);
+            follows = follows && !once;
+        }
         if (form)
             nv_general(p, c->k + i, s, form == 2);
-        else if (fused && i)
+        else if (fused && i >= begin)
             odd += nv_fused(p, c->k + i, s, follows);
         else
             odd += nv_plain(p, c->k + i, s, follows);
@@ -172,11 +180,14 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         }
         made = i + 1;
         // what no step looked at is checked here; what no step changes, once
-        if (c->look && (odd != 0.0 || LOOK_NEURONS(form) || (form || !i ? LOOK_CONNECTIONS : LOOK_UNWATCHED)))
+        if (c->look && (odd != 0.0 || LOOK_NEURONS(form) || ((form || !i) && LOOK_CONNECTIONS)
+                        || (!form && (once ? LOOK_ONCE : LOOK_UNWATCHED))))
             break;
     }
     if (fused)
         nv_leave(p);
+    if (once)
+        nv_scatter(p);
     if (follows)
         nv_let_out(p);
     return made;
@@ -193,6 +204,9 @@ class Written:
     long_tables: tuple[Table, ...]
     #: how many weights are packed in whole runs
     packed: int
+    #: how many states are kept once in whole runs, and which these are
+    once: int
+    kept: frozenset[Key]
     #: how many numbers ``nv_state.work`` has
     work: int
     #: whether connections share signals
@@ -226,57 +240,67 @@ class _Function(NamedTuple):
     write: Callable[[StepCode], None]
     #: its further parameters
     parameters: str = ""
-    #: what it is for alone, and empty where there is none of that: connections that are fused, or what steps before it
-    #: in the text leave to be let out
-    only: Literal["", "fused", "late"] = ""
+    #: what it is for alone, and empty where there is none of that: what whole runs do otherwise, states that are kept
+    #: once there, or what steps before it in the text leave to be let out
+    only: Literal["", "fused", "once", "late"] = ""
 
 
 def _write(network: Network, layout: SignalLayout) -> Written:
     emitter, tables, built = Emitter(), Tables("double", LONGEST), Built(network, layout)
-    plan = built.plan
-    small = len(network.neurons) + len(network.connections) <= c_plan.written_out(plan, SMALL)
-    bodies, room = list[str](), 0
-    pointers = _pointer_lines(network, plan)
+    small = len(network.neurons) + len(network.connections) <= c_plan.written_out(built.plan, SMALL)
+    bodies, work = list[str](), 0
+    once = None if small else kept_once(network)
+    built_once = built if once is None else Built(once.network, layout, once.kept, built)
     watched = bool(network.projections) and not small
     # a network that is written out is in registers, and nothing is gained
     whole = StepCode(built, Code(emitter, tables, network.dt, {}), Form())
-    fused = not small and whole.count + int(whole.fuses.sum()) > 0
-    there = {"": True, "fused": fused, "late": False}
-    for type_, name, form, write, parameters, only in _functions(small, watched):
-        code = Code(emitter, tables, network.dt, network.settable.variables)
+    packed = not small and whole.count + int(whole.fuses.sum()) > 0
+    there = {"": True, "fused": packed or once is not None, "once": once is not None, "late": False}
+    variables = network.settable.variables if once is None else once.variables
+    for type_, name, form, write, parameters, only in _functions(small, watched, once):
+        code, of = Code(emitter, tables, network.dt, variables), built_once if only in ("fused", "once") else built
         if there[only]:
-            write(step := StepCode(built, code, form))
-            room = max(room, step.room)
+            write(step := StepCode(of, code, form))
+            work = max(work, c_plan.work_size(of.plan) + step.room)
         if form.follows and built.settles:
             made, code.lines = code.lines, _let_out_late(code.lines)
             there["late"] |= len(code.lines) < len(made)
         if type_ == "double":
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
+        elif type_ == "int64_t" and not there[only]:
+            code.line("return 0;")
         head = f"static {type_} {name}(const nv_state *p{parameters})"
+        pointers = _pointer_lines(network, of.plan, once)
         named = {name: line for name, line in pointers.items() if f"*restrict {name}" not in parameters}
         bodies += [*function(code, head, named | tables.pointer_lines()), ""]
-    counts = {"NEURONS": len(network.neurons), "CONNECTIONS": len(network.connections)}
-    counts["INPUTS"] = network.vector_size
-    defined = [f"#define {name} {value}" for name, value in counts.items()]
-    looks = _look(built, watched)
-    defined += [f"#define LOOK_NEURONS(form) ({looks.neurons})", f"#define LOOK_CONNECTIONS ({looks.connections})"]
-    defined += [f"#define LOOK_UNWATCHED ({looks.unwatched})", f"#define FUSED {int(fused)}"]
-    defined.append(f"#define BEFORE {int(whole.fuses.any())}")
-    used = words_of(bodies)
+    used, flags = words_of(bodies), {"FUSED": there["fused"], "ONCE": there["once"], "PACKED": packed}
+    flags["BEFORE"] = bool(whole.fuses.any())
     parts = [
         _HEAD,
-        c_flows.declarations(plan),
-        "\n".join(defined),
+        c_flows.declarations(built.plan),
+        _defined(built, flags, _look(built, watched, once)),
         emitter.helpers(used),
         tables.text(used),
         "\n".join(bodies),
     ]
     text = "\n\n".join(part for part in parts if part) + _TAIL
-    work = c_plan.work_size(plan) + room
-    return Written(text, tuple(tables.passed_in), whole.count if fused else 0, work, bool(layout.shared))
+    states, kept = (0, frozenset[Key]()) if once is None else (c_once.size(once), frozenset(once.kept))
+    count = whole.count if packed else 0
+    return Written(text, tuple(tables.passed_in), count, states, kept, work, bool(layout.shared))
 
 
-def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
+def _defined(built: Built, flags: Mapping[str, bool], looks: _Looks) -> str:
+    """The constants of the text."""
+    network = built.network
+    counts = {"NEURONS": len(network.neurons), "CONNECTIONS": len(network.connections), "INPUTS": network.vector_size}
+    counts |= {name: int(flag) for name, flag in flags.items()}
+    codes = {"LOOK_NEURONS(form)": looks.neurons, "LOOK_CONNECTIONS": looks.connections}
+    codes |= {"LOOK_UNWATCHED": looks.unwatched, "LOOK_ONCE": looks.once}
+    lines = [f"#define {name} {value}" for name, value in counts.items()]
+    return "\n".join([*lines, *(f"#define {name} ({code})" for name, code in codes.items())])
+
+
+def _functions(small: bool, watched: bool, once: Once | None) -> tuple[_Function, ...]:
     """The functions that ``nv_once`` and ``nv_run`` call. Those of type double give ``odd``."""
     of_inputs, of_step = ", int64_t k, double *restrict s", ", int64_t k, const double *restrict s"
     of_signals = ", int64_t k, const double *restrict weights, double *restrict formed"
@@ -299,7 +323,19 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
         _Function("void", "nv_signals", Form(gone=True, cut=True, lost=True), StepCode.signals, of_signals),
         _Function("void", "nv_pack", fused, StepCode.pack, only="fused"),
         _Function("void", "nv_leave", fused, lambda step: step.leave(step.fuses), only="fused"),
+        _Function("int64_t", "nv_gather", Form(), _of_once(once, c_once.gather), only="once"),
+        _Function("void", "nv_scatter", Form(), _of_once(once, c_once.scatter), only="once"),
     )
+
+
+def _of_once(once: Once | None, write: Callable[[Once, Code], None]) -> Callable[[StepCode], None]:
+    """What writes a function of states that are kept once, where there are any."""
+
+    def written(step: StepCode) -> None:
+        if once is not None:
+            write(once, step.code)
+
+    return written
 
 
 def _let_out_late(lines: list[str]) -> list[str]:
@@ -309,7 +345,7 @@ def _let_out_late(lines: list[str]) -> list[str]:
     return lines if "outlets" in words_of(others) else others
 
 
-def _pointer_lines(network: Network, plan: c_plan.Plan | None) -> dict[str, str]:
+def _pointer_lines(network: Network, plan: c_plan.Plan | None, once: Once | None) -> dict[str, str]:
     """For each array of the state, and for what is handed over, the line that gives it its name."""
     kinds = (
         ("double", ("activity", "weights", "signals", "history", "outlets", "packed")),
@@ -320,6 +356,7 @@ def _pointer_lines(network: Network, plan: c_plan.Plan | None) -> dict[str, str]
     lines = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
     names = [state_name(use.owner, i) for _, use in network.uses for i in range(len(use.definition.kept))]
     lines |= c_plan.pointer_lines(plan, "double", "restrict", "p->work")
+    lines |= {} if once is None else c_once.pointer_lines(once)
     lines["fresh"] = "const int fresh = (int)p->fresh;"
     return lines | {name: f"double *restrict const {name} = p->cells[{at}];" for at, name in enumerate(names)}
 
@@ -332,18 +369,20 @@ def _shows_state(model: Definition) -> bool:
 
 class _Looks(NamedTuple):
     """The code of whether anything is not finite behind a step of a ``form``: anything that neurons carry, and that
-    connections carry, and what of the latter a plain step has not watched itself."""
+    connections carry, and what of the latter a plain step has not watched itself, and one with states that are kept
+    once."""
 
     neurons: str
     connections: str
     unwatched: str
+    once: str
 
 
-def _look(built: Built, watched: bool) -> _Looks:
+def _look(built: Built, watched: bool, once: Once | None) -> _Looks:
     """What is looked at behind the steps of a network; ``watched``: whether plain ones watch what they can."""
     network = built.network
     tests = {"neuron": [f"nv_odd(p->activity, {len(network.neurons)})"], "connection": list[str]()}
-    unwatched = list[str]()
+    unwatched, whole = list[str](), list[str]()
     if built.settles and all(_shows_state(one.model.definition) for one in network.populations):
         tests["neuron"] = [f"(form && {tests['neuron'][0]})"]  # where nothing is held it is what a cell is
     if network.projections and len(network.changing):  # what neither a rule nor an event changes is finite
@@ -357,14 +396,19 @@ def _look(built: Built, watched: bool) -> _Looks:
                 tests[use.definition.kind.each].append(test)
                 if use.definition.kind.each == "connection" and not is_watched(use.definition, one):
                     unwatched.append(test)
+                    if once is not None and Key(use.owner, one.name) not in once.kept:
+                        whole.append(test)
             cell += 1
-    found = (tests["neuron"], tests["connection"], unwatched if watched else tests["connection"])
+    if once is not None:
+        whole.append(f"nv_odd(p->once, {c_once.size(once)})")
+    found = (tests["neuron"], tests["connection"], unwatched if watched else tests["connection"], whole)
     return _Looks(*(" || ".join(some) or "0" for some in found))
 
 
 _POINTERS: Final = (
     *("activity", "weights", "signals", "history", "outlets", "s", "x", "parameters", "holding"),
-    *("reads", "held", "lesioned", "gone", "cut", "still", "lost", "given", "cells", "before", "packed", "work"),
+    *("reads", "held", "lesioned", "gone", "cut", "still", "lost"),
+    *("given", "cells", "before", "packed", "once", "work"),
 )
 
 
@@ -382,7 +426,7 @@ class _Course(ctypes.Structure):
 
     _fields_ = [
         *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look")),
-        *((name, ctypes.c_int64) for name in ("beside", "changes", "columns")),
+        *((name, ctypes.c_int64) for name in ("fused", "beside", "changes", "columns")),
         *(
             (name, ctypes.c_void_p)
             for name in ("rows", "activity", "weights", "states", "formed", "weighed", "changing", "probed")
@@ -447,7 +491,9 @@ class CStepper:
         self._run.argtypes, self._run.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
         self._long_tables, self._packed, self._work = made.long_tables, np.zeros(made.packed), np.zeros(made.work)
         self._table_addresses = _addresses(self._long_tables)
+        self._once, self._kept_once = np.zeros(made.once), made.kept
         self._pointers.packed, self._pointers.work = self._packed.ctypes.data, self._work.ctypes.data
+        self._pointers.once = self._once.ctypes.data
         self._pointers.given = ctypes.addressof(self._table_addresses)
 
     def read(self, computed: frozenset[str]) -> None:
@@ -509,6 +555,7 @@ class CStepper:
             form=self._form(state),
             then=_GENERAL if state.k + 1 < self._plain_from else _PLAIN,
             look=look,
+            fused=True,
             beside=self._contiguous,
             changes=weights.shape[1],
             rows=rows.ctypes.data,
@@ -519,6 +566,8 @@ class CStepper:
         if self._probed is not None:
             probe, states = self._probed
             numbers, self._probed = probe.addresses(state, self._formed), None
+            read = (Key(one.owner, one.state) for one in probe.reads)
+            course.fused = not (self._kept_once and probe.forms) and self._kept_once.isdisjoint(read)
             if probe.forms:
                 course.formed = self._formed.ctypes.data
                 course.weighed = self._weighed.ctypes.data if len(self._weighed) else None

@@ -151,6 +151,8 @@ class Code:
         self._constant: set[str] = set()
         #: lines at the head of the function, by the identifier that each declares; one may read those before it
         self.head: dict[str, str] = {}
+        #: in a loop over rows of connections their order: connection ``q`` is number ``e`` of it
+        self.order: Indices | None = None
         #: what every expression may name; kd and td are k and t as numbers, declared at the head where they are read
         self.common_names: dict[str, Value] = {**constants(dt), "k": "kd", "t": "td"}
         self._dt = dt

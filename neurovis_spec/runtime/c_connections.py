@@ -6,7 +6,7 @@ In: a Network, which members of a projection are meant. Out: code of each name, 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple, TypeVar
 
@@ -14,10 +14,11 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import JOINING, RULE, Definition, Key, Population, Projection
+from neurovis_spec.compiler.program import JOINING, RULE, Definition, Key, Population, Projection, Use
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
+from neurovis_spec.runtime.kept_once import Kept
 from neurovis_spec.runtime.lags import Lags, lags_of
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.stages import End, Formulas, behind_flow, ends_of, target_of
@@ -73,6 +74,8 @@ class Ends:
     """What there is to read at the ends of the connections of a network, whatever form of a step reads it."""
 
     network: Network
+    #: states of connections that are kept once for many, in another projection
+    kept: Mapping[Key, Kept] = field(default_factory=dict)
 
     @cached_property
     def depth(self) -> int:
@@ -127,8 +130,20 @@ class Sight:
 
     def states(self, some: Some) -> dict[str, str]:
         """The states of a synapse or a rule at one connection."""
-        use, place = self.network.projections[some.number].use, self.code.at(some.which, some.place)
-        return {one.name: f"{state_name(use.owner, i)}[{place}]" for i, one in enumerate(use.definition.kept)}
+        return self.cells(self.network.projections[some.number].use, self.code.at(some.which, some.place))
+
+    def cells(self, use: Use, place: Place) -> dict[str, str]:
+        """The states of a definition in use, and its outputs, of one member, wherever they are kept."""
+        found = {one.name: f"{state_name(use.owner, i)}[{place}]" for i, one in enumerate(use.definition.kept)}
+        for name in found if self.ends.kept else ():
+            if (once := self.ends.kept.get(Key(use.owner, name))) is not None:
+                found[name] = f"{state_name(once.owner, once.number)}[{self.among_kept(once, place)}]"
+        return found
+
+    def among_kept(self, once: Kept, place: Place) -> Place:
+        """Where a state that is kept once for many stands, of one connection."""
+        order = self.code.order
+        return self.code.at(once.of, place) if order is None else self.code.at(once.of[order], "e")
 
     def clock(self, made: Definition) -> dict[str, Value]:
         """``t`` and ``dt`` where they are in another unit than seconds."""

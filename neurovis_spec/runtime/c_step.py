@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial, singledispatch
 from typing import NamedTuple
 
@@ -29,6 +29,7 @@ from neurovis_spec.compiler.events.settable import HIGH, LOW, bias_of
 from neurovis_spec.compiler.network import Input, Network, Outlet
 from neurovis_spec.compiler.program import (
     PHASES,
+    RULE,
     SPIKE,
     SYNAPSE,
     Advance,
@@ -54,11 +55,12 @@ from neurovis_spec.compiler.values.spikes import FIRES
 from neurovis_spec.language.expressions.emit_c import Made, Value
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of
-from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name, words_of
+from neurovis_spec.runtime.c_code import Code, Form, Place, plus, words_of
 from neurovis_spec.runtime.c_connections import Ends, Forming, Sight, Some, taken, taken_at
 from neurovis_spec.runtime.c_plan import Plan, plan_of
 from neurovis_spec.runtime.c_spikes import Firing
 from neurovis_spec.runtime.events import rows_of, takes_spikes
+from neurovis_spec.runtime.kept_once import Kept
 from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
 from neurovis_spec.runtime.stages import acts_now, port_with, signal_of, target_of, unfolded
 from neurovis_spec.runtime.state import Mask
@@ -77,6 +79,10 @@ class Built:
 
     network: Network
     layout: SignalLayout
+    #: states of connections that are kept once for many, in projections of their own
+    kept: Mapping[Key, Kept] = field(default_factory=dict)
+    #: what is worked out already of the network without these, where they change nothing of it
+    whole: Built | None = None
 
     @cached_property
     def plan(self) -> Plan | None:
@@ -99,11 +105,13 @@ class Built:
     @cached_property
     def ends(self) -> Ends:
         """What there is to read at the ends of connections."""
-        return Ends(self.network)
+        return Ends(self.network, self.kept)
 
     @cached_property
     def incoming(self) -> list[list[Incoming]]:
         """What arrives at each port of each population, but for spikes of the same step that act behind all."""
+        if self.whole is not None:
+            return self.whole.incoming
         network = self.network
         return [
             [
@@ -169,7 +177,8 @@ class StepCode:
         self.sent_with = frozenset(
             number
             for number in (one.projection for one in learn if one.phases == PHASES)
-            if _common_delay(network.connections.delays[network.projections[number].members]) > 0
+            if network.projections[number].kind == RULE
+            and _common_delay(network.connections.delays[network.projections[number].members]) > 0
             and self.all_send(network.projections[number].members)
         )
         #: what arrives at a stage at ports of populations
@@ -612,7 +621,7 @@ class StepCode:
 
     def states(self, use: Use, place: Place) -> dict[str, str]:
         """The states of a definition in use, and its outputs, of one member."""
-        return {one.name: f"{state_name(use.owner, i)}[{place}]" for i, one in enumerate(use.definition.kept)}
+        return self.sight.cells(use, place)
 
     def change(
         self,
@@ -814,11 +823,12 @@ class StepCode:
         with self.firing.before(rows, sight.sent or bool(delays.all())) as (ago, row, _):
             starts, order = code.tables.name(rows.starts), code.at(rows.order, "e")
             with code.block(code.loop("e", f"{starts}[{row} + 1]", f"{starts}[{row}]")):
-                first = len(code.lines)
+                first, code.order = len(code.lines), rows.order
                 if self.form.lost and ago:
                     code.line(f"if (k - {ago} < lost[{code.at(members, 'q')}])")
                     code.line("    continue;")
                 yield "q"
+                code.order = None
                 if "q" in words_of(code.lines[first:]):  # not with one member alone
                     code.line(f"const int32_t q = {order};")
                     code.lines.insert(first, code.lines.pop())
