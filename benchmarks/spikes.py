@@ -7,8 +7,8 @@ run can be compared.
 The networks are that of Brunel (2000) with kicks, of 500 and 5,000 neurons (10 % of all connections) and 10,000 (5 %),
 that of Vogels and Abbott (2005) with conductances (COBA), and a thousand neurons that come to a thousand others along a
 million connections, which learn by the timing of spikes. We make the connections and first values, and peers take the
-same. All integrate exactly, or, where that is not to be had, by exponential Euler (NEST: as its models do), and note
-every spike.
+same; and, without peers, COBA with synapses that bring conductances, each with its own states, or shared. All integrate
+exactly, or, where that is not to be had, by exponential Euler (NEST: as its models do), and note every spike.
 
 Times are of the processor, of the loop alone: what a run of all steps takes without what one of a single step takes;
 Brian2's (``cpp_standalone``, -O2) is what its clock says of its loop or what its whole program takes, whatever is less.
@@ -92,6 +92,31 @@ connections:
 {chr(10).join(lines)}"""
 
 
+def synapses(n: int, *, shared: bool) -> str:
+    """The same with conductances of synapses: of each connection, or of all of an entry at a target."""
+    lines = [
+        f"  {i} -> E + I: {{weight: {w}, pattern: {{random: {{probability: 0.02}}}}, synapse: {{receptor: {given}}}}}"
+        for i, w, given in (("E", 0.3, "{tau: 5, E: 0}"), ("I", 3.35, "{tau: 10, E: -80}"))
+    ]
+    return f"""models:
+  neuron:
+    time: ms
+    state: {{v: {{initial: -60, derivative: (drive - v - 60)/20}}}}
+    spike: {{when: v > -50, set: {{v: -60}}, refractory: 5, hold: v}}
+synapses:
+  receptor:
+    shared: {str(shared).lower()}
+    time: ms
+    parameters: {{tau: 5, E: 0}}
+    state: {{g: {{derivative: -g/tau, on_pre: g + weight}}}}
+    signal: g*(E - post.v)
+neurons:
+  E: {{count: {n * 4 // 5}, model: neuron, bias: 12, initial: {{v: "uniform(-60, -50)"}}}}
+  I: {{count: {n // 5}, model: neuron, bias: 12, initial: {{v: "uniform(-60, -50)"}}}}
+connections:
+{chr(10).join(lines)}"""
+
+
 def stdp(n: int) -> str:
     """Neurons that all come to all others; pairs of spikes change the weights."""
     return f"""models:
@@ -132,6 +157,8 @@ CASES = {
     "brunel5000": Case("Brunel, 5,000", "brunel", lambda: brunel(5000, 0.1), 5000, 0.7),
     "brunel10000": Case("Brunel, 10,000", "brunel", lambda: brunel(10000, 0.05), 3000, 0.7),
     "coba": Case("COBA, 4,000", "coba", lambda: coba(4000), 5000, 0.7),
+    "synapses": Case("COBA, 4,000, a synapse each", "coba", lambda: synapses(4000, shared=False), 1000),
+    "shared": Case("COBA, 4,000, synapses shared", "coba", lambda: synapses(4000, shared=True), 1000),
     "stdp": Case("STDP, 1,000,000 connections", "stdp", lambda: stdp(1000), 1000, 0.7),
     "silent": Case("silent, 1,000 neurons, 100,000 connections", "brunel", lambda: brunel(1000, 0.1, 10.0), 10000),
     "alone": Case("the neurons alone", "brunel", lambda: brunel(1000, 0.1, 10.0).split("connections:")[0], 10000),
