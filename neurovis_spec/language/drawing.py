@@ -54,6 +54,7 @@ from neurovis_spec.language.values import (
     Reference,
     ReferenceField,
     TitleField,
+    ViewField,
     as_reference,
     pair,
     sole,
@@ -220,6 +221,9 @@ class LayoutModel(Model):
     plan: PlanField
     file: TextField | None = Field(None, description="An earlier layout, whose places are kept where they can be.")
     spacing: Spacing | None = Field(None, description="Distances in units of the layout.")
+    view: ViewField | None = Field(
+        None, description="From where positions of three numbers are seen: top, front, side, or [azimuth, elevation]."
+    )
 
 
 class ModuleLayoutModel(Model):

@@ -20,7 +20,6 @@ from neurovis_spec.language.grammar import (
     ENDS,
     FORMULA,
     FORMULAS,
-    GROUP,
     GROUP_DRAWN,
     LABEL,
     NOISE,
@@ -31,7 +30,6 @@ from neurovis_spec.language.grammar import (
     SETTABLE,
     TEXT,
     TEXTS,
-    TWO,
     WHICH,
     AsTable,
     Either,
@@ -230,6 +228,8 @@ class InputModel(Model):
         return "write {values: …}, one row a step" if isinstance(node, AnyList) else super()._instead(node)
 
 
+#: Where a neuron is.
+POSITION: Final = ListOf(FORMULA, least=2, most=3)
 InputsField = Annotated[Named[InputModel], declaring("input")]
 
 
@@ -238,7 +238,7 @@ def _position(node: Node, info: ValidationInfo) -> FileReference | TableColumn |
         return as_places_column(node, info)
     if isinstance(node, Mapping):
         return as_file(node, info)
-    wanted = "a position [x, y], a list of them, or {file: …}"
+    wanted = "a position [x, y] or [x, y, z], a list of them, or {file: …}"
     return node if isinstance(node, AnyList) else refuse(info, node, wanted)
 
 
@@ -318,9 +318,11 @@ class GroupModel(Model):
     )
     position: Annotated[
         FileReference | TableColumn | AnyList | None,
-        Leaf(_position, Either((TWO, ListOf(TWO), FILE, PLACES))),
-        GROUP,
-    ] = Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")
+        Leaf(_position, Either((POSITION, ListOf(POSITION), FILE, PLACES))),
+        GROUP_DRAWN,
+    ] = Field(
+        None, description="Where the neuron is, as data: [x, y] or [x, y, z], a list of them, a file. It is no pin."
+    )
     label: Annotated[LabelsField, LABEL] | None = Field(
         None,
         description="Display text; a counted group may give a list, or {file: …, column: …}. May hold expressions: "

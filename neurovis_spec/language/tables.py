@@ -318,9 +318,8 @@ def _as_column(node: Mapping, shape: Map, info: ValidationInfo) -> TableColumn:
             name = "columns" if several else "column"
             findings_of(info).error("missing-key", opening(node), f"the key '{name}' is missing", hint)
         give_up()
-    if several and (not isinstance(written, AnyList) or len(written) != _DIMENSIONS):
-        flat = "positions are in a plane" if isinstance(written, AnyList) and len(written) > _DIMENSIONS else None
-        refuse(info, written, "the columns of x and y", flat)
+    if several and (not isinstance(written, AnyList) or len(written) not in _DIMENSIONS):
+        refuse(info, written, "the columns of x and y, or of x, y and z")
     columns = each(one_or_more(written), as_text, info)
     if default is not None and not isinstance(default, Scalar):
         refuse(info, default, "a number or a text")
@@ -328,7 +327,7 @@ def _as_column(node: Mapping, shape: Map, info: ValidationInfo) -> TableColumn:
 
 
 #: How many numbers a position has.
-_DIMENSIONS: Final = 2
+_DIMENSIONS: Final = (2, 3)
 
 
 def as_numbers_column(node: Mapping, info: ValidationInfo) -> TableColumn:

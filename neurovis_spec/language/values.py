@@ -75,7 +75,7 @@ from neurovis_spec.language.tables import (
     is_from_table,
 )
 from neurovis_spec.language.units import Seconds, measured
-from neurovis_spec.language.words import Combine
+from neurovis_spec.language.words import VIEWPOINTS, Combine
 from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, Sequence, one_or_more
 
 T = TypeVar("T")
@@ -547,8 +547,8 @@ class Pair(NamedTuple):
     span: Span
 
 
-#: What to do with a position of three numbers.
-FLAT: Final = "leave the third number out: positions, and the distances between them, are in a plane"
+#: What to do with a pin of three numbers.
+FLAT: Final = "leave the third number out: a layout is in a plane; a neuron's 'position' may have three"
 
 
 def pair(wanted: str, of_three: str | None = None) -> Leaf[Node]:
@@ -565,6 +565,19 @@ def pair(wanted: str, of_three: str | None = None) -> Leaf[Node]:
 
 
 PointField = Annotated[Pair, pair("a position [x, y]", FLAT)]
+
+
+def as_view(node: Node, info: ValidationInfo) -> Pair | Located[str]:
+    """From where a network in space is seen: one of the words, or two angles."""
+    if not isinstance(node, Sequence):
+        return one_of(*VIEWPOINTS)(node, info)
+    if len(node.items) != 2:
+        refuse(info, node, "a view [azimuth, elevation]")
+    first, second = each(node.items, as_formula, info)
+    return Pair(first, second, node.span)
+
+
+ViewField = Annotated[Pair | Located[str], Leaf(as_view, Either((words(*VIEWPOINTS), TWO)), True)]
 
 
 def as_title(node: Node, info: ValidationInfo) -> Located[bool] | Located[str]:

@@ -4,7 +4,7 @@ In: nothing. Out: types and tables; the models take their words from here.
 """
 
 from collections.abc import Mapping
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 Direction = Literal["down", "up", "right", "left"]
 Combine = Literal["sum", "product", "distance", "max"]
@@ -30,3 +30,16 @@ VIEWS = ("network", "matrix", "traces", "raster", "weights", "body")
 TIMED = ("traces", "raster", "weights")
 #: Those that show the whole of something, and take no references.
 WHOLE = ("network", "body")
+
+
+class Viewpoint(NamedTuple):
+    """From where a network in space is seen: degrees around the z axis, 0 in front (where y is greatest), and degrees
+    above the plane of x and y."""
+
+    azimuth: float
+    elevation: float
+
+
+#: Those that have names.
+VIEWPOINTS: Final = {"top": Viewpoint(0.0, 90.0), "front": Viewpoint(0.0, 0.0), "side": Viewpoint(90.0, 0.0)}
+TOP: Final = VIEWPOINTS["top"]

@@ -83,13 +83,15 @@ def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "p
             return float(base.ravel()[index])
         case Subset(whole=whole, places=places):
             return formula(code, whole, int(places[_number(place)]), parameters)
-        case Distance(positions=positions, sources=sources, targets=targets):
+        case Distance(positions=positions, sources=sources, targets=targets, axes=axes):
             index = _number(place)
             ends = (int(sources[index]), int(targets[index]))
-            x, y = (
-                [code.text(formula(code, positions, 2 * end + axis, parameters)) for end in ends] for axis in (0, 1)
-            )
-            return f"hypot{code.emitter.suffix}(({x[0]}) - ({x[1]}), ({y[0]}) - ({y[1]}))"
+            found = ""
+            for axis in range(axes):
+                one, other = (code.text(formula(code, positions, axes * end + axis, parameters)) for end in ends)
+                apart = f"({one}) - ({other})"
+                found = apart if not found else f"hypot{code.emitter.suffix}({found}, {apart})"
+            return found
     raise ExportError("a parameter is used in a way that C cannot work out")
 
 

@@ -133,7 +133,9 @@ def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
     theme = planned.theme
     fills = colours(theme, seen.discs)
     groups, states = [], ShownStates(planned.network).called
-    for index, name in enumerate(planned.network.neurons.names):
+    names = planned.network.neurons.names
+    for index in planned.depth or range(len(names)):
+        name = names[index]
         disc = Disc(planned.centres[index], planned.radii[index], fills[index], theme.ring, planned.rings[index])
         label, data = planned.labels[index], {"neuron": name}
         if states[index]:

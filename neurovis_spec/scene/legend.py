@@ -52,6 +52,8 @@ class Contents:
     sent_traces: tuple[float, ...] = ()
     #: the unit of these times
     unit: str = "s"
+    #: from where neurons in space are seen, '' where all are in a plane
+    seen: str = ""
 
 
 def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = False) -> list[LegendEntry]:
@@ -73,6 +75,8 @@ def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = Fal
         result.append(_trace("activity fades", contents.traces, contents.unit, theme))
     elif contents.sent_traces:
         result.append(_trace("spikes fade", contents.sent_traces, contents.unit, theme))
+    if contents.seen:
+        result.append(_size(contents.seen, theme))
     if contents.lesions:
         result.append(_faint(theme))
     return result
@@ -202,6 +206,17 @@ def _trace(first: str, times: tuple[float, ...], unit: str, theme: Theme) -> Leg
     discs = [Disc((6 + 17.0 * place, SAMPLE_Y), 6, fill, theme.ring, 0.8) for place, fill in enumerate(fills)]
     words = [Text((0, FIRST_Y), first, SMALL, theme.muted), Text((0, SECOND_Y), second, SMALL, theme.muted)]
     return LegendEntry((heading("Trace", theme), *discs, *words), across)
+
+
+def _size(seen: str, theme: Theme) -> LegendEntry:
+    """Discs that grow, as those of neurons do that are nearer."""
+    first, second = "nearer is larger", f"seen {seen}"
+    across = max(64.0, texts.width(first, SMALL), texts.width(second, SMALL))
+    sizes = (3.5, 4.5, 5.5, 6.5)
+    fill = colours(theme, [0.0])[0]
+    discs = [Disc((7 + 17.0 * place, SAMPLE_Y), size, fill, theme.ring, 0.8) for place, size in enumerate(sizes)]
+    words = [Text((0, FIRST_Y), first, SMALL, theme.muted), Text((0, SECOND_Y), second, SMALL, theme.muted)]
+    return LegendEntry((heading("Size", theme), *discs, *words), across)
 
 
 def _faint(theme: Theme) -> LegendEntry:

@@ -20,6 +20,7 @@ from neurovis_spec.layout.geometry import Rect
 from neurovis_spec.layout.labels import BESIDE, UNIT, label_rects, label_room
 from neurovis_spec.layout.model import RADIUS, Layout, Point, Side
 from neurovis_spec.layout.naming import natural_key
+from neurovis_spec.projection import called, nearness
 from neurovis_spec.scene import delays, encoding, legend, texts
 from neurovis_spec.scene.boxes import Box, boxes_of, entitled
 from neurovis_spec.scene.caption import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
@@ -56,6 +57,8 @@ from neurovis_spec.scene.titles import Titled, elsewhere, in_one_place, outline
 
 #: how high a line is that says what is left out; what texts keep of the picture's edge
 _NOTE_LINE, _EDGE = 16.0, 6.0
+#: how large the farthest of neurons in space is, where the nearest is as large as others are
+_FAR = 0.55
 #: how large a neuron is that is out of focus
 _UNFOCUSED = 0.4
 #: a picture is made so wide at most to have its legend in one row, and its whole title
@@ -83,6 +86,8 @@ class Plan:
     #: of the connections that are drawn
     lines: Mapping[int, Line]
     order: tuple[int, ...]
+    #: neuron indices from back to front, where some are nearer than others; empty where all are in a plane
+    depth: tuple[int, ...]
     #: on connections whose signal takes several steps, by index
     beads: Mapping[int, Rectangle]
     #: what events remove, and when
@@ -144,6 +149,7 @@ def plan(
         counts={line: count for line, count in enumerate(drawn.counts.tolist()) if drawn.sheaf[line]},
         lines=page.lines,
         order=_order(network, encoding.thickness(network.connections.weights.whole(), gains.thickness), seen.lines),
+        depth=() if content.near is None else tuple(np.argsort(content.near, kind="stable").tolist()),
         beads=delays.beads(network, page.lines, RADIUS * frame.scale, theme),
         lesions=content.lesions,
         labels=tuple(raised(said.labels, sizes)),
@@ -183,6 +189,8 @@ class _Content:
     ends: legend.Ends
     notes: tuple[str, ...]
     extent: Rect
+    #: (n,) how near neurons in space are, None where all are in a plane
+    near: FloatArray | None
 
 
 def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights: FloatArray) -> _Content:
@@ -190,6 +198,8 @@ def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights:
     positions, routes = _in_units(network, layout)
     seen = shown(network, drawn.asked(settings), weights, _lengths(routes))
     radii = np.array([radius_of(size) for size in drawn.sizes.tolist()]) * np.where(seen.focus, 1.0, _UNFOCUSED)
+    near = nearness(network, layout.engine)
+    radii = radii if near is None else radii * (_FAR + (1.0 - _FAR) * near)
     rooms = _rooms(network, layout) if settings.labels else {}
     sides = {index: layout.labels[network.neurons.names[index]] for index in rooms}
     boxes = boxes_of(network, positions, routes, rooms)
@@ -199,7 +209,21 @@ def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights:
     extent = _extent(positions, radii, routes, boxes, beside, rooms.values())
     lesions, signals, ends = lesions_of(network), Signals(drawn.whole).called, _ends(drawn)
     return _Content(
-        network, positions, routes, seen, radii, rooms, sides, boxes, teachers, lesions, signals, ends, notes, extent
+        network=network,
+        positions=positions,
+        routes=routes,
+        seen=seen,
+        radii=radii,
+        rooms=rooms,
+        sides=sides,
+        boxes=boxes,
+        teachers=teachers,
+        lesions=lesions,
+        signals=signals,
+        ends=ends,
+        notes=notes,
+        extent=extent,
+        near=near,
     )
 
 
@@ -484,6 +508,7 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
             traces=_least_and_most(told_times(network, seconds_of(network))),
             sent_traces=_least_and_most(told_times(network, sent_seconds_of(network))),
             unit=network.dt_unit,
+            seen="" if content.near is None else called(network.layout.view),
         )
         for brief in (False, True):
             items = legend.entries(contents, gains, theme, brief=brief)

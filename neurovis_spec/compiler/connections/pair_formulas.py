@@ -209,7 +209,7 @@ class PairFormulas:
         found: dict[str, Dependent] = {}
         if "distance" in used:
             sources, targets = (end.astype(np.int64) for end in self._reached(at))
-            found["distance"] = Distance(self.census.moving, sources, targets)
+            found["distance"] = Distance(self.census.moving, sources, targets, self.census.neurons.position.shape[1])
         for name in used:
             side, point, parameter = name.partition(".")
             if point:

@@ -95,6 +95,8 @@ def _squared_distances(
 def _squared(differences: FloatArray) -> FloatArray:
     """Squared lengths. Squares and a sum are the same on every machine; a root need not be."""
     result: FloatArray = differences[..., 0] ** 2 + differences[..., 1] ** 2
+    for axis in range(2, differences.shape[-1]):
+        result = result + differences[..., axis] ** 2
     return result
 
 

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.language.words import Direction
+from neurovis_spec.language.words import TOP, Direction, Viewpoint
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +80,8 @@ class LayoutSettings:
     plan: tuple[Cell, ...] = ()
     #: an earlier layout, as the spec names it
     file: str | None = None
+    #: from where positions of three numbers are seen
+    view: Viewpoint = TOP
 
 
 @dataclass(frozen=True, slots=True)

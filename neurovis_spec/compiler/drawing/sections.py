@@ -35,8 +35,8 @@ from neurovis_spec.language.drawing import GainValue, LayoutModel, ModuleLayoutM
 from neurovis_spec.language.located import Formula, Located, value_or
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
-from neurovis_spec.language.values import Reference
-from neurovis_spec.language.words import Direction
+from neurovis_spec.language.values import Pair, Reference
+from neurovis_spec.language.words import TOP, VIEWPOINTS, Direction, Viewpoint
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.likeness import suggest
 from neurovis_spec.themes import COLOURS
@@ -89,7 +89,24 @@ def layout_settings(
         align=lines,
         plan=plan,
         file=value_or(model.file, None),
+        view=_view(model, scopes[0].constants, census, findings),
     )
+
+
+def _view(model: LayoutModel, constants: Constants, census: Census, findings: Findings) -> Viewpoint:
+    """From where the network is seen."""
+    view = model.view
+    if view is None:
+        return TOP
+    if census.neurons.position.shape[1] == 2:
+        message, hint = "'view' has no effect: no neuron has a position of three numbers", "give position: [x, y, z]"
+        findings.warning("no-effect", view.span, message, hint)
+    if not isinstance(view, Pair):
+        return VIEWPOINTS.get(view.value, TOP)
+    azimuth, elevation = (known(constants.scalar(one), 0.0) for one in (view.first, view.second))
+    if not -90 <= elevation <= 90:
+        findings.error("out-of-range", view.second.span, f"an elevation is from -90 to 90 degrees, not {elevation:g}")
+    return Viewpoint(azimuth, elevation)
 
 
 def _plan_cells(

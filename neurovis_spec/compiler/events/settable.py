@@ -171,24 +171,26 @@ def apart(positions: FloatArray, one: Indices, other: Indices) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Distance:
-    """How far source and target of connections are from each other. ``positions`` are x and y of all neurons in turn:
-    x0, y0, x1, y1, …"""
+    """How far source and target of connections are from each other. ``positions`` are x and y of all neurons in turn,
+    x0, y0, x1, y1, …, or three numbers each, where there are so many ``axes``."""
 
     positions: Assembled
     sources: IntArray
     targets: IntArray
+    axes: int = 2
 
     @property
     def slots(self) -> frozenset[int]:
         """The parameters that it reads."""
         found = np.concatenate((self.sources, self.targets))
         parts = self.positions.parts
-        # number k of the positions is one of neuron k // 2
-        return frozenset().union(*(part.formula.slots for part in parts if np.isin(part.within(0) // 2, found).any()))
+        # number k of the positions is one of neuron k // axes
+        read = (part for part in parts if np.isin(part.within(0) // self.axes, found).any())
+        return frozenset().union(*(part.formula.slots for part in read))
 
     def values(self, parameters: FloatArray, by: Library = NUMPY) -> FloatArray:
         """The distances with these parameters."""
-        return apart(self.positions.values(parameters, by).reshape(-1, 2), self.sources, self.targets)
+        return apart(self.positions.values(parameters, by).reshape(-1, self.axes), self.sources, self.targets)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

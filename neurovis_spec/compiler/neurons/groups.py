@@ -183,7 +183,7 @@ class Builder:
         initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name, table)
         starts = self._starts(given, n, name, kind, model, table) if given.states else _NO_STARTS
         inputs = self._inputs(model, n, name, kind)
-        position, position_parts = self._position(model, n, table)
+        position, position_parts = self._position(model, n, name, table)
         noises = self._noises(model, name, kind)
         if names is UNKNOWN or n is UNKNOWN:
             return UNKNOWN
@@ -269,13 +269,14 @@ class Builder:
         return tuple(WrittenNoise(port, formula, tree) for port, formula, tree in found if tree is not UNKNOWN)
 
     def _position(
-        self, model: GroupModel, n: int | Unknown, table: TableReader
+        self, model: GroupModel, n: int | Unknown, name: str, table: TableReader
     ) -> tuple[FloatArray | Unknown, list[Part]]:
         """The positions, NaN without any, and what of them follows parameters."""
         if model.position is None:
             return UNKNOWN if n is UNKNOWN else _defaults(n).position, []
         with self.constants.following() as parts:
-            position = positions_of(model.position, n, self.constants, table)
+            stream = Stream(self.seed, "position", self.scope.called(name))
+            position = positions_of(model.position, n, self.constants, table, stream)
         return position, [part._replace(field="position") for part in parts]
 
     def _starts(

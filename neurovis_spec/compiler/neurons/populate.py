@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray, frozen, narrow
-from neurovis_spec.compiler.events.settable import Assembled, Subset
+from neurovis_spec.compiler.events.settable import Assembled, Part, Subset
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.levels import default_delay
 from neurovis_spec.compiler.limits import Limits
@@ -98,13 +98,14 @@ class Census:
 
     @cached_property
     def moving(self) -> Assembled:
-        """The positions, x and y in turn, of which some may follow parameters."""
-        parts = [
-            part._replace(places=2 * one.group.start + part.within(2 * one.group.count))
-            for one in self.groups
-            for part in one.parts
-            if part.field == "position"
-        ]
+        """The positions, x and y (and z) in turn, of which some may follow parameters."""
+        axes, parts = self.neurons.position.shape[1], list[Part]()
+        for one in self.groups:
+            own = 2 if one.position is UNKNOWN else one.position.shape[1]
+            for part in one.parts:
+                if part.field == "position":
+                    neuron, axis = np.divmod(part.within(own * one.group.count), own)
+                    parts.append(part._replace(places=axes * (one.group.start + neuron) + axis))
         return Assembled(self.neurons.position.ravel(), tuple(parts))
 
     def straight(self, one: Indices, other: Indices) -> FloatArray:
@@ -319,7 +320,7 @@ def _join(all_groups: list[_ScopeGroups]) -> Census:
         bias=frozen(np.concatenate([item.bias for item in built] or [empty])),
         initial=frozen(np.concatenate([item.initial for item in built] or [empty])),
         input=frozen(np.concatenate([item.input for item in built] or [empty.astype(np.int64)])),
-        position=frozen(np.concatenate([_positions(item) for item in built] or [np.zeros((0, 2))])),
+        position=frozen(_positions(built)),
         starts=_starts(built, len(names)),
         port_bias=_of_ports(built, [one.port_bias for one in built], np.zeros(len(names))),
         port_input=_of_ports(built, [one.port_input for one in built], np.full(len(names), -1, dtype=np.int64)),
@@ -349,9 +350,13 @@ def _of_ports(
     return {port: frozen(array) for port, array in result.items()}
 
 
-def _positions(item: Built) -> FloatArray:
-    """The positions of a group's neurons, NaN where there is none."""
-    return np.full((item.group.count, 2), np.nan) if item.position is UNKNOWN else item.position
+def _positions(built: list[Built]) -> FloatArray:
+    """The positions of all neurons, NaN where there is none; of three numbers where any has three, and then those of
+    two are at height 0."""
+    given = [np.full((one.group.count, 2), np.nan) if one.position is UNKNOWN else one.position for one in built]
+    axes = max((one.shape[1] for one in given), default=2)
+    wide = [one if one.shape[1] == axes else np.column_stack((one, 0.0 * one[:, 0])) for one in given]
+    return np.concatenate(wide or [np.zeros((0, 2))])
 
 
 def _directories(all_groups: list[_ScopeGroups], total: int) -> tuple[Directory, ...]:
