@@ -30,6 +30,7 @@ from neurovis_spec.compiler.program import (
     Operation,
     Receive,
     SendAhead,
+    Softmax,
     Update,
 )
 from neurovis_spec.describe import wired
@@ -233,6 +234,8 @@ def _rows(network: Network, operation: Operation) -> Iterator[tuple[str, str, st
     match operation:
         case Update(population=one):
             yield "update", _members(network, one), ""
+        case Softmax(population=one):
+            yield "softmax", _members(network, one), ""
         case Advance(population=one, phase=phase):
             changing = _changed(network.populations[one].model.definition.during([phase]))
             yield _PHASES.get(phase, phase), _members(network, one), changing

@@ -139,6 +139,8 @@ def _population(population: Population) -> Record:
         "model_parameters": population.model.parameters,
         "incoming": population.drive.incoming,
     }
+    if population.shares is not None:
+        fields["shares"] = population.shares
     return Record("Block", fields)
 
 
@@ -159,7 +161,8 @@ def _definition(made: Definition) -> Record:
     """What of a definition is content."""
     named = {"name": made.name, "parameters": sorted(made.parameters)}
     if made.kind == ACTIVATION:
-        return Record("Activation", {**named, "value": made.given.each_step})
+        softmax = {"softmax": True} if made.softmax else {}
+        return Record("Activation", {**named, "value": made.given.each_step, **softmax})
     inner = {"let": made.let, "state": sorted(made.state, key=_named)}
     if made.kind == MODEL:
         return Record("Model", {**named, **inner, "activity": made.given.each_step, **_beyond(made)})

@@ -347,7 +347,7 @@ def _order(
     """The levels of all neurons; None where neurons wait for each other, which is reported: a cycle of connections that
     are in order is one whatever becomes of the others."""
     held = held_at(census.neurons, inputs, noises) if census.models.flow else {}
-    order = order_of(census.models.different, census.models.of, connected.wired, held)
+    order = order_of(census.models.different, census.models.of, connected.wired, held, census.units)
     if not isinstance(order, Cycle):
         return order
     names = (*census.neurons.names, "the integration")

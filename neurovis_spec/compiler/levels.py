@@ -93,12 +93,17 @@ class Order(NamedTuple):
 
 
 def order_of(
-    models: Sequence[Definition], model: Indices, wired: Wired, held: Mapping[str, BoolArray]
+    models: Sequence[Definition],
+    model: Indices,
+    wired: Wired,
+    held: Mapping[str, BoolArray],
+    units: IntArray | None = None,
 ) -> Order | Cycle:
     """The levels of all neurons. ``models`` are those that there are, ``model`` the number of that of each neuron;
-    ``held`` says by ports where something is added that does not flow: tables, supplied inputs, noise."""
+    ``held`` says by ports where something is added that does not flow: tables, supplied inputs, noise. Neurons of the
+    same number among ``units`` are updated as one, those of −1 by themselves."""
     if wired.flow or any(one.flows for one in models):
-        return _Coupled(models, model, wired, held).order
+        return _Coupled(models, model, wired, held, units).order
     level: IntArray | Cycle = np.zeros(len(model), dtype=np.int64)
     now: Mapping[str, BoolArray] = {}
     if (wired.delays.kept == 0).any():
@@ -108,7 +113,8 @@ def order_of(
         now = acting_now(models, model, wired)
         waited_for = waited_for & ~_all_now(wired, now)
         undelayed = np.flatnonzero(waited_for)
-        level = levels_along(len(model), undelayed, wired.sources.some(undelayed), wired.targets.some(undelayed))
+        ends = wired.sources.some(undelayed), wired.targets.some(undelayed)
+        level = _of_units(len(model), (undelayed, *ends), units)
     return level if isinstance(level, Cycle) else Order(level, np.zeros(len(model), dtype=np.int64), now=now)
 
 
@@ -178,6 +184,7 @@ class _Coupled:
     model: Indices
     wired: Wired
     held: Mapping[str, BoolArray]
+    units: IntArray | None = None
 
     @cached_property
     def taken(self) -> Taken:
@@ -273,6 +280,8 @@ class _Coupled:
         n, taken = len(self.model), self.taken
         mixed = {port: self.held.get(port, np.zeros(n, dtype=np.bool_)).copy() for port in self.through}
         flowing = taken.of_models(lambda model, name: flows_by(model, name) is not None)
+        if self.units is not None:  # what is worked out for all of a group is so once a step
+            flowing &= self.units < 0
         delayed = ~self.wired.fluent & taken.waited_for
         bringing = ~delayed & (~self.synapse | taken.of_entries(signal_flows))
         while True:
@@ -335,10 +344,10 @@ class _Coupled:
         if isinstance(stage, Cycle):
             return stage
         known = np.zeros(len(self.targets), dtype=np.bool_)
-        level = levels_along(n + 1, *self._waits(known))
+        level = _of_units(n + 1, self._waits(known), self.units)
         if isinstance(level, Cycle):  # perhaps not where nobody waits for what is known behind the integration
             known = self.taken.all("pre", self.taken.of_models(known_behind_flow))
-            other = levels_along(n + 1, *self._waits(known))
+            other = _of_units(n + 1, self._waits(known), self.units)
             if isinstance(other, Cycle):
                 return level
             level = other
@@ -490,6 +499,21 @@ def _joined(edges: list[tuple[Indices, Indices, Indices]]) -> tuple[Indices, Ind
     """Edges one behind the other: connections, begins and ends."""
     connections, begins, ends = zip(*edges, strict=True)
     return np.concatenate(connections), np.concatenate(begins), np.concatenate(ends)
+
+
+def _of_units(n: int, edges: tuple[Indices, Indices, Indices], units: IntArray | None) -> IntArray | Cycle:
+    """The level of each of n nodes, of which those that are one unit have the same."""
+    connections, begins, ends = edges
+    if units is None:
+        return levels_along(n, connections, begins, ends)
+    unit = np.arange(n)
+    unit[: len(units)] = np.where(units < 0, unit[: len(units)], units)
+    level = levels_along(n, connections, unit[begins], unit[ends])
+    if not isinstance(level, Cycle):
+        return level[unit]
+    source = dict(zip(connections.tolist(), begins.tolist(), strict=True))
+    path = [node if one < 0 else source[one] for node, one in zip(level.neurons, level.connections, strict=False)]
+    return level._replace(neurons=(*path, path[0]))
 
 
 def levels_along(n: int, connections: Indices, begins: Indices, ends: Indices) -> IntArray | Cycle:

@@ -38,6 +38,7 @@ from neurovis_spec.compiler.program import (
     Receive,
     Send,
     SendAhead,
+    Softmax,
     Tie,
     Update,
     Use,
@@ -91,7 +92,7 @@ def _updating(number: int, population: Population) -> list[Operation]:
     if model.fires:
         ahead += [Advance(number, "each_step")] if model.has("each_step") else []
         ahead.append(Advance(number, "fire"))
-    return [Gather(number), *ahead, Update(number)]
+    return [Gather(number), *ahead, Update(number), *([] if population.shares is None else [Softmax(number)])]
 
 
 def _at_once(populations: tuple[Population, ...], projections: tuple[Projection, ...]) -> Iterator[Operation]:
@@ -201,8 +202,15 @@ def make_populations(census: Census, wired: Wired, order: Order) -> tuple[Popula
         declared = (PortOf(DRIVE, first.group.combine), *model.definition.ports)
         ports = tuple(_port(one, arriving[one.name][number] if one.name in arriving else _NOTHING) for one in declared)
         level, stage = int(order.level[members[0]]), int(order.stage[members[0]])
-        populations.append(Population(level, frozen(members), activation, model, ports, stage))
+        shares = _shares(group_of_member) if activation.definition.softmax else None
+        populations.append(Population(level, frozen(members), activation, model, ports, stage, shares))
     return tuple(populations)
+
+
+def _shares(group_of_member: IntArray) -> IntArray:
+    """Where each group begins among the members of a population, and behind the last one."""
+    begins = np.flatnonzero(np.diff(group_of_member, prepend=-1))
+    return frozen(np.append(begins, len(group_of_member)))
 
 
 class _Arriving(NamedTuple):

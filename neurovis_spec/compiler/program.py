@@ -180,6 +180,8 @@ class Definition:
     fires: bool = False
     #: of a synapse whether all connections of an entry that lead to the same target have its states together
     shared: bool = False
+    #: of an activation whether the neurons of a group share 1: exp(f(x)), divided by the sum of these
+    softmax: bool = False
 
     def during(self, phases: Collection[Phase]) -> Definition:
         """The same with what is carried out of it in these phases."""
@@ -385,6 +387,8 @@ class Population:
     model: Use
     ports: tuple[Port, ...]
     stage: int = 0
+    #: where each group begins among the members, and behind the last one, where its neurons share 1 among each other
+    shares: IntArray | None = None
 
     @property
     def uses(self) -> tuple[Use, ...]:
@@ -489,6 +493,14 @@ class Gather(Operation):
 class Update(Operation):
     """The states and the activity of a population, from its drive; at step 0 neurons with ``initial`` take it
     instead."""
+
+    population: int
+
+
+@dataclass(frozen=True, slots=True)
+class Softmax(Operation):
+    """The activities of a population, behind its Update: within each group exp(a), divided by the sum of these. A
+    neuron that is held, or begins with its ``initial``, is what it is, and the others share the rest of 1."""
 
     population: int
 

@@ -220,6 +220,8 @@ class Parts(NamedTuple):
     spike: SpikeModel | None = None
     #: whether its states are those of all connections of an entry to the same target
     shared: bool = False
+    #: of an activation whether a group shares 1 by it
+    softmax: bool = False
 
     @property
     def units(self) -> AnyMapping[str, str]:
@@ -250,11 +252,15 @@ class ActivationModel(DefinitionModel):
     value: Annotated[FormulaField, IN_ACTIVATION] = Field(
         description="An expression of x, the combined input, and the parameters."
     )
+    softmax: BoolField | None = Field(
+        None,
+        description="Whether exp(value) is divided by the sum of these of all neurons of the group (default false).",
+    )
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
 
     def parts(self) -> Parts:
         """What it says."""
-        return Parts(self.parameters, self.let, self.value)
+        return Parts(self.parameters, self.let, self.value, softmax=value_or(self.softmax, False))
 
 
 class TimedModel(DefinitionModel):

@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial, singledispatch
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,7 @@ from neurovis_spec.compiler.program import (
     ReadInputs,
     Receive,
     Send,
+    Softmax,
     Tie,
     Update,
     Use,
@@ -868,6 +870,33 @@ class StepCode:
             left_out = f"cut[{connection}] || {total} == 0"
             code.line(f"formed[{connection}] = {left_out} ? {zero} : {value}*(weights[{connection}]/{total});")
 
+    def softmax(self, number: int) -> None:
+        """The shares of the groups of a population in 1, each of which lies in a row; those that begin with an
+        ``initial`` are that at the first step."""
+        population = self.network.populations[number]
+        assert population.shares is not None
+        for begin, end in pairwise(population.shares.tolist()):
+            first, last = int(population.members[begin]), int(population.members[end - 1]) + 1
+            begins = bool(np.isnan(self.network.neurons.initial[first]))
+            with nullcontext() if begins else self.unless_first(), self.code.block(""):
+                self._share(first, last)
+
+    def _share(self, first: int, last: int) -> None:
+        """The shares of the neurons from the first one on."""
+        code, exp = self.code, f"exp{self.code.emitter.suffix}"
+        free = "if (!held[q]) " if self.form.held else ""
+        code.line(f"{code.real} greatest = -INFINITY, taken = 0, total = 0;")
+        with code.block(code.loop("q", last, first)):
+            if free:
+                code.line("if (held[q]) taken += activity[q];")
+            code.line(f"{'else ' if free else ''}if (activity[q] > greatest) greatest = activity[q];")
+        with code.block(code.loop("q", last, first)), code.block(free.strip()):
+            code.line(f"activity[q] = {exp}(activity[q] - greatest);")
+            code.line("total += activity[q];")
+        code.line(f"const {code.real} rest = taken < 1 ? 1 - taken : 0;")
+        code.line(code.loop("q", last, first))
+        code.line(f"    {free}activity[q] = activity[q]/total*rest;")
+
     def tie(self, operation: Tie) -> None:
         """The weights of tied connections, behind the rules of those that they are of."""
         code = self.code
@@ -1111,3 +1140,8 @@ def _learn(operation: Learn, step: StepCode) -> None:
 @write.register
 def _tie(operation: Tie, step: StepCode) -> None:
     step.tie(operation)
+
+
+@write.register
+def _softmax(operation: Softmax, step: StepCode) -> None:
+    step.softmax(operation.population)

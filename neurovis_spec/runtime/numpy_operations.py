@@ -45,6 +45,7 @@ from neurovis_spec.compiler.program import (
     Receive,
     Send,
     SendAhead,
+    Softmax,
     Tie,
     Update,
     Use,
@@ -67,6 +68,7 @@ from neurovis_spec.runtime.numpy_events import come_to_some, seen_by
 from neurovis_spec.runtime.numpy_flows import diffuse, integrate
 from neurovis_spec.runtime.numpy_lags import behind_lags
 from neurovis_spec.runtime.signals import SharedSlots
+from neurovis_spec.runtime.softmax import share
 from neurovis_spec.runtime.stages import formulas_of, given, unfolded
 
 
@@ -371,3 +373,19 @@ def _tie(operation: Tie, step: Step) -> None:
     code, count = step.code, len(step.network.connections)
     taken = code.select("weights", operation.of, count)
     code.line(f"weights{code.position(operation.connections, count)} = {taken}")
+
+
+@emit.register
+def _softmax(operation: Softmax, step: Step) -> None:
+    """The shares of groups in 1; at step 0, members with ``initial`` are that."""
+    code, network, number = step.code, step.network, operation.population
+    population = network.populations[number]
+    members, initial = population.members, network.neurons.initial[population.members]
+    assert population.shares is not None
+    code.namespace["share"] = share
+    free = code.let("q", f"np.ones({len(members)}, dtype=bool)")
+    if not np.isnan(initial).all():
+        code.line(f"if {FIRST}: {free}[{code.constant(np.flatnonzero(~np.isnan(initial)))}] = False")
+    code.line(f"if holds and holds[{number}]: {free}[np.isin({code.constant(members)}, holds[{number}][0])] = False")
+    place = code.position(members, len(network.neurons))
+    code.line(f"activity{place} = share(activity{place}, {free}, {code.constant(population.shares)})")

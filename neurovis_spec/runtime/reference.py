@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import singledispatch
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,7 @@ from neurovis_spec.compiler.program import (
     Receive,
     Send,
     SendAhead,
+    Softmax,
     Tie,
     Update,
     Use,
@@ -43,6 +45,7 @@ from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.events import rows_of
 from neurovis_spec.runtime.reference_flows import Flow
 from neurovis_spec.runtime.reference_seen import NO_FUNCTIONS, Functions, NetworkArray, Seen, is_first, with_let
+from neurovis_spec.runtime.softmax import shared
 from neurovis_spec.runtime.stages import acts_now, formulas_of, given
 from neurovis_spec.runtime.state import State
 
@@ -382,3 +385,16 @@ def _learn(operation: Learn, by: ReferenceStepper, state: State, inputs: FloatAr
 def _tie(operation: Tie, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
     for connection, other in zip(operation.connections.tolist(), operation.of.tolist(), strict=True):
         state.weights[connection] = state.weights[other]
+
+
+@perform.register
+def _softmax(operation: Softmax, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    population = by.network.populations[operation.population]
+    members, initial = population.members, by.network.neurons.initial
+    assert population.shares is not None
+    for begin, end in pairwise(population.shares.tolist()):
+        own = members[begin:end].tolist()
+        begun = [is_first(state) and not math.isnan(float(initial[neuron])) for neuron in own]
+        held = [state.conditions.held_at(neuron) is not None for neuron in own]
+        free = [not (one or other) for one, other in zip(begun, held, strict=True)]
+        state.activity[own] = shared(state.activity[own].tolist(), free)

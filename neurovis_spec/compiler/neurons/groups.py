@@ -24,7 +24,7 @@ from neurovis_spec.compiler.names.state_references import no_port, no_state
 from neurovis_spec.compiler.network import Group, Input
 from neurovis_spec.compiler.neurons.labels import check_length, labels_of
 from neurovis_spec.compiler.neurons.positions import positions_of
-from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, SPIKE, Kind
+from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, SPIKE, Kind, is_activation, ports_of
 from neurovis_spec.compiler.values.arguments import (
     Each,
     Settled,
@@ -39,7 +39,8 @@ from neurovis_spec.compiler.values.definitions import Definitions
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.table_values import TableReader
 from neurovis_spec.diagnostics import shorten
-from neurovis_spec.language.expressions.tree import Tree, draws
+from neurovis_spec.language.expressions.tree import Tree, draws, walk
+from neurovis_spec.language.expressions.tree import names as names_in
 from neurovis_spec.language.located import (
     IDENTIFIER,
     NAME_RULE,
@@ -178,6 +179,7 @@ class Builder:
         table = TableReader(self.scope.files, names, self.scope.called(""))
         kind = self._kind(name, model, n, table)
         self._check_combine(model, kind)
+        self._check_softmax(model, kind)
         biases, bias_parts = self._bias(model, n, name, kind, table)
         given = as_states(model.initial or _NO_INITIAL, kind.model.definition, findings)
         initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name, table)
@@ -245,6 +247,23 @@ class Builder:
             message = f"a state of '{neuron.name}' jumps by '{DRIVE}', which combines by {combine.value} here"
             hint = "a port by which a state jumps is a sum: leave 'combine' out"
             self.constants.findings.error("jump-not-linear", combine.span, message, hint)
+
+    def _check_softmax(self, model: GroupModel, kind: NeuronType) -> None:
+        """Report a model whose activity is no activation of something, where a group shares 1 by its activities."""
+        neuron = kind.model.definition
+        if model.activation is None or not kind.activation.definition.softmax or not is_written(kind, model):
+            return
+        tree = neuron.given.each_step
+        calls = sum(is_activation(node) for one in neuron.formulas for node in walk(one))
+        once = not (neuron.flows or neuron.fires or neuron.given.each_episode)
+        known = {*ports_of(neuron), *(one.name for one in neuron.state)}
+        if once and calls == 1 and tree is not None and is_activation(tree) and not known.isdisjoint(names_in(tree)):
+            return
+        name = model.activation.name
+        message = f"'{shorten(name.value)}' is worked out of the activities of the whole group, and "
+        message += f"the activity of the model '{neuron.name}' is not f(…) of ports or states, once a step"
+        hint = "let a group with a model such as static, activity: f(drive), follow with delay 0"
+        self.constants.findings.error("softmax-model", name.span, message, hint)
 
     def _bias(
         self, model: GroupModel, n: int | Unknown, name: str, kind: NeuronType, table: TableReader

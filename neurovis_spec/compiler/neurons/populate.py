@@ -140,6 +140,18 @@ class Census:
         return Models(tuple(different.values()), np.repeat(narrow(np.array(numbers, dtype=np.int64)), self._counts))
 
     @cached_property
+    def units(self) -> IntArray | None:
+        """For each neuron the first of those that are updated as one, as they share 1 among each other, else −1; None
+        where there are none."""
+        if not any(one.kind.activation.definition.softmax for one in self.groups):
+            return None
+        result = np.full(len(self.neurons), -1, dtype=np.int64)
+        for one in self.groups:
+            if one.kind.activation.definition.softmax:
+                result[one.group.start : one.group.start + one.group.count] = one.group.start
+        return result
+
+    @cached_property
     def _counts(self) -> list[int]:
         return [one.group.count for one in self.groups]
 

@@ -650,6 +650,7 @@ def definition_of(
         sign=checker.sign(parts.sign, defaults),
         fires=spike is not None,
         shared=parts.shared,
+        softmax=parts.softmax,
     )
     checker.no_spikes(definition)
     checker.sharing(definition)
