@@ -27,6 +27,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
+import pyarrow
+import pyarrow.parquet
 from robustness_runs import RUNS, SUFFIXES, Attempt, network
 
 import neurovis_spec as nv
@@ -243,6 +245,19 @@ def _edges(data: bytes, seconds: float = 0.2, mib: float = 60) -> Case:
     return Case(text, _write("e.csv", data), seconds, mib)
 
 
+def _parquet(rows: int) -> bytes:
+    """A Parquet file of so many equal rows."""
+    column = pyarrow.DictionaryArray.from_arrays(pyarrow.array(np.zeros(rows, dtype=np.int8)), pyarrow.array([1.5]))
+    stream = io.BytesIO()
+    pyarrow.parquet.write_table(pyarrow.table(dict.fromkeys("nxyz", column)), stream)
+    return stream.getvalue()
+
+
+def _damaged(data: bytes) -> bytes:
+    """The same with bytes of its pages turned over."""
+    return data[:10] + bytes(255 - byte for byte in data[10:60]) + data[60:]
+
+
 def _their_edges(data: bytes, seconds: float = 0.2, mib: float = 60) -> Case:
     """Edges by columns of others, of rows that are picked, with a value in a further column."""
     columns = "columns: {from: a, to: b}, where: {c: x}"
@@ -314,7 +329,7 @@ FILES: dict[str, Case] = {
     "a table: 100,000 neurons of which no row is": _sheet(
         b"n,x,y,z\n" + b"".join(b"L%d,1,1,1\n" % k for k in range(100_000)), seconds=1, mib=100, count=100_000
     ),
-    "a table: 200,000 rows in quotes": _sheet(b'n,x,y,z\n"K1",1,"y",1\n' * 200_000, seconds=3, mib=100),
+    "a table: 200,000 rows in quotes": _sheet(b'n,x,y,z\n"K1",1,"y",1\n' * 200_000, seconds=3.5, mib=110),
     "a table: a quote never closed": _sheet(b'n,x,y,z\n"' + b"K1,1,1,1\n" * 200_000),
     "a table: a header of a million cells": _sheet(b"n," * 1_000_000 + b"x,y,z\n"),
     "a table: 31 million separators": _sheet(
@@ -323,6 +338,19 @@ FILES: dict[str, Case] = {
     "a table: a cell of 10 MB": _sheet(b"n x y z\nK1 " + b"9" * 10_000_000 + b" 1 1\n", seconds=0.7),
     "a table: NUL bytes": _sheet(b"n\tx\ty\tz\n" + b"\0" * 1_000_000, "a.tsv"),
     "a table: numbers beyond double precision": _sheet(b"n,x,y,z\n" + b"K1,1e999,1e999,1\n" * 100_000, seconds=1),
+    "a table: .npz of 1 GiB, it says": _sheet(
+        _zip({f"{name}.npy": _npy(_header("(134217728,)")) + bytes(1 << 10) for name in "nxyz"}), "a.npz"
+    ),
+    "a table: .npz of 64 MiB of zeros a column": _sheet(
+        _zip({f"{name}.npy": _npy(_header("(8388608,)")) + bytes(1 << 26) for name in "nxyz"}), "a.npz"
+    ),
+    "a table: .npz of texts of 4 GB, it says": _sheet(
+        _zip({f"{name}.npy": _npy(_header("(1,)", "'<U999999999'")) + bytes(64) for name in "nxyz"}), "a.npz"
+    ),
+    "a table: .npz that unpickles": _sheet(_zip({"n.npy": _saved(np.array([{"a": 1}], dtype=object))}), "a.npz"),
+    "a table: .parquet cut off": _sheet(_parquet(10)[:-6], "a.parquet", 0.5, 120),
+    "a table: .parquet of 50 million equal rows": _sheet(_parquet(50_000_000), "a.parquet", 0.5, 120),
+    "a table: .parquet with other bytes within": _sheet(_damaged(_parquet(1000)), "a.parquet", 0.5, 120),
     "a table that is a picture": _sheet(b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 400),
     ".csv that is a picture": _file("a.csv", b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 400),
 }

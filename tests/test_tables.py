@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import re
+import sys
 from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
+import pandas
 import pytest
 from data_attempts import HERE
 from hypothesis import given
@@ -293,6 +295,77 @@ def test_the_neurons_of_a_table_are_those_of_its_rows(tmp_path: Path) -> None:
     (tmp_path / "c.csv").write_text("name\nK1\nK2\n")
     assert answer(text % "count: 3, ", tmp_path)[1] == "'names' has 2 names, 'count' says 3"
     assert codes(text.replace("column: name", "column: name, by: name") % "", tmp_path) == ["unknown-key"]
+
+
+def saved(path: Path, columns: dict[str, list[object]]) -> None:
+    """A table as NumPy or pandas writes it."""
+    if path.suffix == ".npz":
+        np.savez_compressed(path, allow_pickle=False, **{name: np.array(values) for name, values in columns.items()})
+    else:
+        pandas.DataFrame(columns).to_parquet(path)
+
+
+@pytest.mark.parametrize("name", ["cells.npz", "cells.parquet"])
+def test_tables_of_arrays(name: str, tmp_path: Path) -> None:
+    saved(tmp_path / name, {
+        "cell": ["K2", "K1", "L"], "leak": [0.5, 0.25, 9.0], "kind": [1, 1, 2], "x": [1, 0, 5], "y": [0, 0, 5],
+    })  # fmt: skip
+    by = f"file: {name}, by: cell"
+    text = (
+        f"neurons: {{K: {{count: 2, model: {{leaky_integrator: {{leak: {{{by}, column: leak}}}}}}, bias: 1, "
+        f"position: {{{by}, columns: [x, y]}}}}, "
+        f"L: {{names: {{file: {name}, column: cell, where: {{kind: 2}}}}, bias: {{file: {name}, column: x, "
+        f"where: {{cell: L}}}}}}}}"
+    )
+    network = compiled(text, tmp_path)
+    assert network.network.neurons.groups[0].model_parameters == {"leak": (0.25, 0.5)}
+    assert network.network.neurons.names == ("K1", "K2", "L")
+    assert network.network.neurons.bias.tolist() == [1, 1, 5]
+    assert nv.compile_text(network.text()).hash == network.hash
+    for wrong, told in (
+        ("by: cell, column: lek", "no column 'lek'"),
+        ("by: cell, column: cell", "'cell' is no column of numbers"),
+        ("column: leak", "the table has 3 rows, and there are 2 neurons"),
+        ("column: leak, where: {kind: 3}", "no row has '3'"),
+    ):
+        assert told in answer(f"neurons: {{K: {{count: 2, bias: {{file: {name}, {wrong}}}}}}}", tmp_path)[1]
+
+
+@pytest.mark.parametrize("name", ["worm.npz", "worm.parquet"])
+def test_edges_in_arrays(name: str, tmp_path: Path) -> None:
+    saved(tmp_path / name, {
+        "pre": ["AVAL", "AVAL", "AVAR"], "post": ["AVAR", "AVBL", "AVBL"], "N": [3, 2, 1], "ms": [1.0, 2.5, 1.0],
+        "kind": ["chemical", "chemical", "gap"], "rate": [0.5, 0.25, 1.0],
+    })  # fmt: skip
+    columns = "columns: {from: pre, to: post, weight: N, delay: {column: ms, unit: ms}}"
+    edges = f"edges: {{file: {name}, {columns}, where: {{kind: chemical}}}}"
+    text = f"{CELLS}connections: {{C -> C: {{{edges}, plasticity: {{decay: {{rate: {{column: rate}}}}}}}}}}"
+    network = compiled(text, tmp_path)
+    assert wires(network.network) == [("AVAL", "AVAR", 3.0, 2), ("AVAL", "AVBL", 2.0, 5)]
+    assert parameters(network.network) == {"rate": [0.5, 0.25]}
+    assert nv.compile_text(network.text()).hash == network.hash
+    assert "row 2, column 4" in answer(text.replace("{column: ms, unit: ms}", "ms"), tmp_path)[1]
+    assert "no neuron 'chemical' (row 1 of the file)" in answer(text.replace("to: post", "to: kind"), tmp_path)[1]
+
+
+def test_arrays_that_are_no_table(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", x=np.arange(2.0), y=np.arange(3), z=np.eye(2), w=np.array([1, np.inf]))
+    (tmp_path / "b.parquet").write_bytes(b"PAR1" + bytes(100) + b"PAR1")
+    for table, told in (
+        ("file: a.npz, column: z", "'z': an array of 2 dimensions where one is wanted"),
+        ("file: a.npz, by: x, column: y", "'x' has 2 values, another column 3"),
+        ("file: a.npz, column: w", "row 2, column 4: this is infinity"),
+        ("file: b.parquet, column: x", "this is no .parquet file, or it is damaged"),
+    ):
+        assert told in answer(f"neurons: {{K: {{count: 2, bias: {{{table}}}}}}}", tmp_path)[1]
+
+
+def test_a_parquet_without_its_reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.parquet").write_bytes(b"PAR1")
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    code, message, hint = answer("neurons: {K: {bias: {file: a.parquet, column: x}}}", tmp_path)
+    assert (code, hint) == ("file-unreadable", "pip install 'neurovis-spec[parquet]'")
+    assert "pyarrow, which is not installed" in message
 
 
 RECIPES = re.split(r"^## ", (Path(__file__).parents[1] / "docs" / "tables.md").read_text(encoding="utf-8"), flags=re.M)

@@ -65,7 +65,7 @@ DATA_FILES: Final = (".csv", ".npy", ".npz", ".mtx")
 #: How those of text end whose cells something separates.
 TEXT_FILES: Final = (".csv", ".tsv", ".txt", ".dat")
 #: How those end whose columns have names.
-TABLE_FILES: Final = TEXT_FILES
+TABLE_FILES: Final = (*TEXT_FILES, ".npz", ".parquet")
 
 
 def file_and_keys(node: Mapping, shape: Map, info: ValidationInfo) -> tuple[FileReference, Mapping]:

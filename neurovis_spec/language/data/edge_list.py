@@ -46,6 +46,7 @@ from neurovis_spec.language.data.columns import (
     picked,
     rows_picked,
 )
+from neurovis_spec.language.data.sheet import Sheet
 from neurovis_spec.language.data.table import CellError, Faults, Room, in_cell, in_row, quoted
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.tables import EdgeFile
@@ -166,6 +167,44 @@ def parse_edges(parts: list[bytes], room: Room | None = None, file: EdgeFile | N
         if room is not None:
             room(reader.count)
     return reader.table()
+
+
+def edges_of(sheet: Sheet, file: EdgeFile, room: Room | None = None) -> EdgeTable:
+    """EdgeTable from a table whose columns are arrays. Raises CellError."""
+    written = written_of([*sheet.header], file._replace(where=()), COMMAS)
+
+    def called(what: str) -> Located[str]:
+        return Located(sheet.header[written.places[what]], file.file.path.node)
+
+    ends = [sheet.texts(called(what)) for what in ("from", "to")]
+    if room is not None:
+        room(len(ends[0]))
+    number_of_name: dict[str, int] = {}
+    begins, targets = (np.array([number_of_name.setdefault(name, len(number_of_name)) for name in end]) for end in ends)
+    nothing = np.broadcast_to(np.nan, (len(begins),))
+    found = {what: sheet.numbers(called(what)) if what in written.places else nothing for what in written.numbers}
+    rows = np.array([sheet.where(edge) for edge in range(len(begins))], dtype=np.int64)
+    sound = "" not in number_of_name and _are_delays(*(found[what] for what in _NUMBERS[1:]))
+    for edge, row in enumerate([] if sound else rows.tolist()):
+        if not (ends[0][edge] and ends[1][edge]):
+            place = written.places["to" if ends[0][edge] else "from"]
+            raise in_cell(row, place + 1, "the name of a neuron is wanted")
+        if not _are_delays(*(found[what][edge : edge + 1] for what in _NUMBERS[1:])):
+            place = written.places["delay" if "delay" in written.places else "delay_seconds"]
+            raise in_cell(row, place + 1, "this is no delay (0, 1, 2, … steps, or a time)")
+    steps, weights = found["delay"], found["weight"]
+    return EdgeTable(
+        names=tuple(number_of_name),
+        begins=narrow(begins.astype(np.int64)),
+        ends=narrow(targets.astype(np.int64)),
+        weights=np.where(np.isnan(weights), 1.0, weights),
+        delays=integers(_in_brief(np.where(np.isnan(steps), -1.0, steps))),
+        offsets=integers(_in_brief(rows - np.arange(len(rows)))),
+        seconds=_in_seconds(found["delay_seconds"], written.factor) if "delay_seconds" in written.places else None,
+        more={what.removeprefix(MORE): values for what, values in found.items() if what.startswith(MORE)},
+        columns={what.removeprefix(MORE): place + 1 for what, place in written.places.items()},
+        about=sheet.about,
+    )
 
 
 def written_of(header: list[str], file: EdgeFile | None, separator: Separator) -> Written:

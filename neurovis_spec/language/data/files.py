@@ -13,7 +13,17 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full, in_cell
+from neurovis_spec.language.data.table import (
+    EMPTY_CELL,
+    MOST_CELLS,
+    MOST_FAULTS,
+    CellError,
+    Faults,
+    Room,
+    Table,
+    full,
+    in_cell,
+)
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.tables import DATA_FILES, TABLE_FILES, TEXT_FILES, Condition, EdgeFile
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
@@ -199,7 +209,8 @@ def read_edges(
     made. Where rows are invalid, these are reported, and the table has a ``fault``. Codes: those of ``read_data`` and
     of ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``useless-key``.
     """
-    if Path(named.path).suffix.lower() not in TEXT_FILES:
+    suffix = Path(named.path).suffix.lower()
+    if suffix not in (TABLE_FILES if written else TEXT_FILES):
         message = f"edges are read from a .csv file, not from '{_short(named.path)}'"
         findings.error("file-format", named.span, message)
         return UNKNOWN
@@ -209,10 +220,13 @@ def read_edges(
     parts = _read_parts(named, findings, _PART)
     if parts is UNKNOWN:
         return UNKNOWN
-    from neurovis_spec.language.data.edge_list import parse_edges
+    from neurovis_spec.language.data.edge_list import edges_of, parse_edges
 
     try:
-        table = parse_edges(parts, room, written)
+        if written is None or suffix in TEXT_FILES:
+            table = parse_edges(parts, room, written)
+        else:
+            table = edges_of(_sheet_in(b"".join(parts), named, written.where, MOST_CELLS), written, room)
     except CellError as error:
         _refuse(error, named.called, named.span, findings)
         return UNKNOWN
@@ -235,16 +249,28 @@ def read_sheet(named: NamedFile, where: tuple[Condition, ...], findings: Finding
     data = named.path.encode("utf-8", "replace") if named.inline else read_data(named, findings)
     if data is UNKNOWN:
         return UNKNOWN
-    from neurovis_spec.language.data.sheet import parse_sheet
-
     try:
-        sheet = parse_sheet(data, "" if named.inline else named.path, where)
+        sheet = _sheet_in(data, named, where)
     except CellError as error:
         _refuse(error, named.called, named.span, findings)
         return UNKNOWN
     if not named.inline:
         note(named, sheet.about, findings)
     return sheet
+
+
+def _sheet_in(data: bytes, named: NamedFile, where: tuple[Condition, ...], most: int | None = None) -> Sheet:
+    """The table of a file of one of TABLE_FILES, of at most so many rows, or as many as neurons may have. Raises
+    CellError."""
+    from neurovis_spec.language.data.sheet import MOST_ROWS, parse_sheet
+
+    rows = MOST_ROWS if most is None else most
+    suffix = "" if named.inline else Path(named.path).suffix.lower()
+    if suffix in (".npz", ".parquet"):
+        from neurovis_spec.language.data.array_sheet import parse_npz_sheet, parse_parquet_sheet
+
+        return (parse_npz_sheet if suffix == ".npz" else parse_parquet_sheet)(data, where, rows)
+    return parse_sheet(data, suffix, where, rows)
 
 
 def read_column(named: NamedFile, read: Callable[[], T], findings: Findings) -> T | Unknown:

@@ -216,12 +216,12 @@ class Archive:
             raise CellError("file-format", message)
         return parse_array(content, kinds, dimensions)
 
-    def part(self, name: str, kinds: str, dimensions: int = 1) -> NDArray[np.generic]:
-        """An array that a sparse matrix has."""
+    def part(self, name: str, kinds: str, dimensions: int = 1, room: Room | None = None) -> NDArray[np.generic]:
+        """An array that a sparse matrix has, or a column of a table."""
         if name not in self._members:
             raise CellError("file-format", f"there is no array {quoted(name)}, which a sparse matrix has")
         try:
-            return self.array(name, kinds, (dimensions,))
+            return self.array(name, kinds, (dimensions,), room)
         except CellError as error:
             raise CellError(error.code, f"{quoted(name)}: {error}", error.hint) from error
 

@@ -36,13 +36,15 @@ from neurovis_spec.language.data.columns import (
     picked,
     rows_picked,
 )
-from neurovis_spec.language.data.table import CellError, Faults, check_cells, in_cell, in_row
+from neurovis_spec.language.data.table import CellError, Faults, check_cells, check_rows, in_cell, in_row
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.tables import Condition
 
 V = TypeVar("V")
 #: columns of a sheet
 MOST_COLUMNS: Final = 1000
+#: rows of a table of neurons, as many as a sheet of common spreadsheets has
+MOST_ROWS: Final = 1 << 20
 #: what separates the cells of rows that were read one by one, as some are in quotes
 _INNER: Final = b"\x1f"
 _WITHIN: Final = str.maketrans("\x1f\r\n", "   ")
@@ -160,8 +162,8 @@ def _printable(cell: str, row: int, column: int) -> str:
     raise in_cell(row, column, "a text has a character here that cannot be shown")
 
 
-def parse_sheet(data: bytes, path: str, where: tuple[Condition, ...] = ()) -> TextSheet:
-    """The sheet in a file of text, whose first row names its columns. Raises CellError."""
+def parse_sheet(data: bytes, path: str, where: tuple[Condition, ...] = (), most: int = MOST_ROWS) -> TextSheet:
+    """The sheet in a file of text, whose first row names its columns, of at most so many rows. Raises CellError."""
     parts = [data]
     strip_end(parts)
     separator = separator_of(parts, path) if parts else COMMAS
@@ -171,7 +173,9 @@ def parse_sheet(data: bytes, path: str, where: tuple[Condition, ...] = ()) -> Te
         raise in_row(1, f"has {cells:,} cells; a table has {MOST_COLUMNS:,} columns at most")
     first = first_row(text_of(parts, separator), separator)
     header = tuple(first.stripped().cells)
-    check_cells(count_lines(text_of(parts)) * len(header))
+    lines_below = count_lines(text_of(parts))
+    check_rows(lines_below, most)
+    check_cells(lines_below * len(header))
     conditions, faults, found, rows = picked(where, header), Faults(), list[_Some](), 0
     for number, lines in _gathered(below(text_of(parts, separator), first.number)):
         part = _part(lines, number, separator, len(header), faults)

@@ -118,6 +118,12 @@ def check_cells(cells: int, most: int = MOST_CELLS, *, hint: str | None = None) 
         raise CellError("too-large", f"it has more than {most:,} cells, the most that are read", hint)
 
 
+def check_rows(rows: int, most: int) -> None:
+    """Refuse a table of too many rows, before memory is taken for it. Raises CellError."""
+    if rows > most:
+        raise CellError("too-large", f"it has more than {most:,} rows, the most that are read")
+
+
 def check_finite(values: NDArray[np.float64]) -> None:
     """Refuse NaN and infinity, naming the first one, row by row. Raises CellError."""
     finite = np.isfinite(values)
