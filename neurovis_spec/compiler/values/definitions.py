@@ -287,6 +287,15 @@ class _Checker:
         tree = self.read(formula, self.sight(), self.functions)
         return Number(0.0) if tree is UNKNOWN else tree
 
+    def gives(self, kind: Kind, spike: Spike | None) -> Quantity:
+        """What is given; a model that says nothing of it gives its spike."""
+        parts = self.parts
+        each_step, each_episode = self.given(parts.each_step), self.given(parts.each_episode)
+        if each_step is None and kind == MODEL:  # perhaps the spike is invalid, which is reported
+            each_step = Number(0.0) if spike is None else Name(SPIKE)
+        derivative, acts = self.optional(parts.derivative), self.acts(parts.acts)
+        return Quantity(self.given_name, each_step, each_episode, derivative=derivative, acts=acts)
+
     def tree(
         self,
         formula: Formula,
@@ -621,16 +630,8 @@ def definition_of(
     unfolded = checker.unfolded(let) if reading.inlined else {}
     if unfolded is UNKNOWN:
         return UNKNOWN
-    each_step, each_episode = checker.given(parts.each_step), checker.given(parts.each_episode)
-    if each_step is None and kind == MODEL:  # perhaps the spike is invalid, which is reported
-        each_step = Number(0.0) if spike is None else Name(SPIKE)
-    given = Quantity(
-        checker.given_name,
-        each_step,
-        each_episode,
-        derivative=checker.optional(parts.derivative),
-        acts=checker.acts(parts.acts),
-    )
+    given = checker.gives(kind, spike)
+    each_step = given.each_step
     if reading.inlined and parts.each_step is not None and each_step is not None:
         let, given = (), replace(given, each_step=checker.with_let(each_step, unfolded, parts.each_step.span))
     outputs = () if parts.outputs is None else checker.outputs(parts.outputs)
