@@ -35,6 +35,7 @@ from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_states
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State
+from neurovis_spec.scene.ends import ends_of
 
 BACKENDS = ["numpy", pytest.param("c", marks=pytest.mark.compiler)]
 
@@ -304,6 +305,48 @@ def test_each_line_has_its_share_of_the_signal(backend: str) -> None:
     np.testing.assert_allclose(
         ring, ((made["(A1 -> A2).g"] + made["(A1 -> A2).h"] / 2) * (3 - made["A2.v"])).ravel(), rtol=1e-13
     )
+
+
+ENDS = """\
+neurovis: 1
+name: ends
+time: {dt: 1 ms, steps: 40}
+parameters: {q: 0.2}
+models:
+  told: {time: ms, parameters: {q: 1}, state: {v: {derivative: (drive - v)/9}}, spike: {when: v >= 1, set: {v: 0}}}
+  moves: {time: ms, state: {q: {derivative: (drive - q)/7}}, spike: {when: q >= 1, set: {q: 0.1}}}
+  leak: {time: ms, parameters: {part: 0.5}, state: {v: {derivative: (drive - v)/9}}, activity: v}
+synapses:
+  receptor:
+    shared: true
+    state: {g: {each_step: 0.8*g, on_pre: g + weight*pre.q + post.part/9}}
+    signal: post.part*g
+    sign: 0.35 - weight
+modules:
+  half:
+    neurons:
+      A: {count: 2, model: {told: {q: [0.1, 0.3]}}, bias: 1.5}
+      C: {count: 2, model: moves, bias: 1.7 + i}
+      B: {count: 2, model: {leak: {part: 0.5 + i}}}
+    connections: {A + C -> B: {weight: 0.1*(1 + i), pattern: all_to_all, synapse: receptor}}
+instances: {left: {module: half}, right: {module: half}}
+neurons: {P: {model: {told: {q: q}}, bias: 2}}
+connections: {P -> left.B + right.B: {weight: 0.4, pattern: all_to_all, synapse: receptor, delay: 0}}
+events: [{at: 11, set: {q: 0.9}}]
+"""
+
+
+@pytest.mark.parametrize("backend", ["reference", *BACKENDS])
+def test_what_is_added_reads_both_ends(backend: str) -> None:
+    """Parameters of the ends, that may be set, and states, also where one name is the one here and the other there."""
+    together, each = (nv.compile_text(text) for text in (ENDS, ENDS.replace("shared: true", "shared: false")))
+    made, expected = (network.run(40, backend=backend) for network in (together, each))
+    assert np.abs(made["left.B1"]).max() > 0.1
+    np.testing.assert_allclose(made.activity, expected.activity, rtol=1e-12, atol=1e-14)
+    before = nv.compile_text(ENDS[: ENDS.index("events:")]).run(40, backend=backend)
+    assert not np.array_equal(made["left.B"], before["left.B"])
+    network = together.network
+    assert ends_of(network, network.connections.weights.whole()).tolist() == [-1] * 4 + [1, 1, 1, 1, 1, 1, -1, -1] * 2
 
 
 def test_weights_of_0_share_nothing() -> None:
