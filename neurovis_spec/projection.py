@@ -14,6 +14,9 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.words import TOP, VIEWPOINTS, Viewpoint
 
+#: to how many binary digits of the farthest place others are the same
+_EXACT = 36
+
 
 def projected(position: FloatArray, view: Viewpoint) -> tuple[FloatArray, FloatArray]:
     """Where positions (n, 2) or (n, 3) are on the page (n, 2), and how near they are (n,), a plane all the same.
@@ -31,6 +34,16 @@ def projected(position: FloatArray, view: Viewpoint) -> tuple[FloatArray, FloatA
     with np.errstate(invalid="ignore"):  # of those that have no position
         along = [_along(position, axis) for axis in (right, down, towards)]
     return np.stack(along[:2], axis=1), along[2]
+
+
+def joined(places: FloatArray) -> FloatArray:
+    """Places, those of neurons behind each other the same, though they differ by what is rounded."""
+    known = np.isfinite(places)
+    extent = float(np.abs(places[known]).max(initial=0.0))
+    if not extent:
+        return places
+    exponent = int(np.frexp(extent)[1]) - _EXACT
+    return np.ldexp(np.rint(np.ldexp(places, -exponent)), exponent)
 
 
 def _along(position: FloatArray, axis: FloatArray) -> FloatArray:

@@ -141,3 +141,14 @@ def test_a_view_of_a_plane_is_told() -> None:
     assert [(one.code, one.hint) for one in found if one.code == "no-effect"] == [
         ("no-effect", "give position: [x, y, z]")
     ]
+
+
+def test_neurons_behind_each_other_stand_aside_and_stay_large(tmp_path: Path) -> None:
+    """cos(i·π/3) is the same for two of six but for its last bits."""
+    text = "neurons: {A: {count: 12, position: [cos(pi*i/3), sin(pi*i/3), floor(i/6)], bias: 1}}\n"
+    compiled(f"{text}layout: {{engine: spatial, view: front}}\n").render(tmp_path / "x.svg", step=1)
+    found = np.array([*discs(tmp_path / "x.svg").values()])
+    apart = np.hypot(*(found[:, None, :2] - found[None, :, :2]).transpose(2, 0, 1))
+    room = found[:, None, 2] + found[None, :, 2]
+    assert found[:, 2].min() > 5
+    assert (apart + 1e9 * np.eye(12) > room).all()

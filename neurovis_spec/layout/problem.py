@@ -31,7 +31,7 @@ from neurovis_spec.layout.model import (
     Point,
 )
 from neurovis_spec.layout.naming import natural_key
-from neurovis_spec.projection import projected
+from neurovis_spec.projection import joined, projected
 
 _NOWHERE = (math.nan, math.nan)
 _ON_DISC = (0.0, 0.0)
@@ -271,7 +271,8 @@ def _symmetric(network: Network) -> list[str]:
 def _places(network: Network) -> dict[str, Point]:
     """The ``position`` of the neurons that have one."""
     known = np.isfinite(network.neurons.position).all(axis=1)
-    points = projected(network.neurons.position, network.layout.view)[0].tolist()
+    position = network.neurons.position
+    points = (position if position.shape[1] == 2 else joined(projected(position, network.layout.view)[0])).tolist()
     return {network.neurons.names[i]: (points[i][0], points[i][1]) for i in np.flatnonzero(known).tolist()}
 
 
