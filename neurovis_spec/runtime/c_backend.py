@@ -131,8 +131,9 @@ NV_PUBLIC int64_t nv_once(nv_state *p)
 NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
 {
     double *s = c->rows, *activity = c->activity, *weights = c->weights, *states = c->states;
-    // in the fused form from the step ``begin`` on, with what is kept once where it is the same for all
-    int fused = FUSED && c->fused && c->then == 0 && c->steps > 3, once = 0, follows = 0;
+    // in the fused form from the step ``begin`` on, with what is kept once where it is the same for all: to take that
+    // over and back takes less than a step does without
+    int fused = FUSED && c->fused && c->then == 0 && (c->steps > 3 || !PACKED), once = 0, follows = 0;
     const int64_t begin = PACKED || c->form;
     int64_t made = 0;
     if (fused)

@@ -57,8 +57,8 @@ class Kept(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Once:
-    """A ``network`` in which states of the ``whole`` are ``kept`` once, by whose they were; the projections that have them
-    are behind the others."""
+    """A ``network`` in which states of the ``whole`` are ``kept`` once, by whose they were; the projections that have
+    them are behind the others."""
 
     whole: Network
     network: Network
