@@ -368,6 +368,112 @@ def test_what_fits_in_synapses_is_offered(at: str, there: list[str], missing: li
     assert found.keys().isdisjoint(missing)
 
 
+FIRES = """neurovis: 1
+name: fires
+models:
+  cell:
+    ports: [kicks]
+    let: {high: 1 + drive}
+    state: {v: {derivative: -v, noise: 1, jump: 3*kicks}, w: {each_step: w}}
+    spike: {when: v >= high, set: {v: 0}, refractory: 2, hold: v}
+    outputs: {half: v/2}
+    send: v
+  plain: {state: {p: {each_step: p}}, activity: p}
+synapses:
+  fast: {state: {g: {derivative: -g, on_pre: g + weight}}, signal: g + pre.g}
+rules:
+  timed: {state: {a: {derivative: -a, on_pre: a + 1}}, weight: {on_pre: weight - a, on_post: weight + a}}
+  quiet: {weight: {each_step: weight + 1}}
+neurons:
+  E: {model: cell}
+connections:
+  E -> E: {send: v}
+outputs: {o: E.v}
+render: {show: {E: v}}
+events: [{from: 10, clamp: {E.v: 1}}]
+"""
+
+
+@pytest.mark.parametrize(
+    ("at", "there", "missing"),
+    [
+        ("spike: {when: ¦v >= high, ", ["v", "high", "drive", "spike", "f"], ["pre"]),
+        ("set: {¦v: 0}", ["v", "w"], ["half", "activity", "spike"]),
+        ("set: {v: ¦0}", ["v", "drive", "kicks", "k", "f", "spike"], ["half"]),
+        ("hold: ¦v}", ["v", "w"], ["half", "activity", "spike"]),
+        ("jump: 3*¦kicks", ["kicks", "v", "spike"], ["pre"]),
+        ("derivative: ¦-v, noise", ["v", "drive"], ["spike"]),
+        ("noise: ¦1", ["v"], ["spike"]),
+        ("each_step: ¦w}", ["spike"], []),
+        ("let: {high: ¦1", ["spike"], []),
+        ("half: ¦v/2", ["spike"], []),
+        ("    send: ¦v", ["v", "half", "activity", "spike"], ["high"]),
+        ("each_step: ¦p}", ["p"], ["spike"]),
+        ("on_pre: ¦g + weight", ["g", "spike", "weight"], ["drive"]),
+        ("signal: ¦g + ", ["g", "spike"], []),
+        ("pre.¦g}", ["v", "spike", "half"], []),
+        ("on_post: ¦weight + a", ["a", "spike"], []),
+        ("each_step: ¦weight + 1", ["weight"], ["spike"]),
+        ("{send: ¦v}", ["v", "spike", "half", "activity"], []),
+        ("{o: E.¦v}", ["v", "spike", "half"], []),
+        ("{E: ¦v}}", ["v", "spike", "half"], []),
+        ("clamp: {E.¦v", ["v", "spike"], []),
+    ],
+)
+def test_what_fits_where_neurons_fire_is_offered(at: str, there: list[str], missing: list[str]) -> None:
+    plain = at.replace("¦", "")
+    assert FIRES.count(plain) == 1
+    found = offered(FIRES.replace(plain, at))
+    assert found.keys() >= set(there)
+    assert found.keys().isdisjoint(missing)
+
+
+@pytest.mark.parametrize(
+    ("until", "there", "missing"),
+    [
+        ("    spike: {", ["when", "set", "refractory", "hold"], ["each_step"]),
+        ("    state: {v: {", ["derivative", "jump"], ["on_pre", "on_post"]),
+        ("state: {g: {", ["derivative", "on_pre"], ["on_post", "jump"]),
+        ("state: {a: {", ["derivative", "on_pre", "on_post"], ["jump"]),
+        ("weight: {", ["on_pre", "on_post", "each_step"], ["jump"]),
+        ("  cell:\n    ", ["spike", "ports", "state"], ["weight"]),
+    ],
+)
+def test_keys_of_what_fires_are_offered(until: str, there: list[str], missing: list[str]) -> None:
+    found = offered(FIRES.partition(until)[0] + until + "¦")
+    assert found.keys() >= set(there)
+    assert found.keys().isdisjoint(missing)
+
+
+@pytest.mark.parametrize(
+    ("at", "told"),
+    [
+        ("    sp¦ike: {", "**spike**: When it fires"),
+        ("wh¦en: v", "**when**: It fires where this is true"),
+        ("s¦et: {v", "**set**: New values of states"),
+        ("refra¦ctory", "**refractory**: How long it cannot fire again"),
+        ("ho¦ld: v", "**hold**: States that stay as they are"),
+        ("ju¦mp: 3", "**jump**: What is added when spikes arrive"),
+        ("{derivative: -g, on_¦pre: g", "**on_pre**: Its new value when a spike arrives"),
+        ("on_¦post: weight", "**on_post**: Its new value when the target fires"),
+        ("hold: ¦v}", "v = 0 when it fires"),
+        ("1 + spi¦ke", "`spike`: In a model with a spike block, 1 in the step"),
+        ("send: spi¦ke", "`spike`: In a model with a spike block, 1 in the step"),
+        ("g + spi¦ke", "`spike`: In a model with a spike block, 1 in the step"),
+        ("g*pre.spi¦ke", "`spike`: In a model with a spike block, 1 in the step"),
+        ("o: E.spi¦ke", "`spike`: In a model with a spike block, 1 in the step"),
+    ],
+)
+def test_what_fires_is_explained(at: str, told: str) -> None:
+    spec = FIRES.replace("1 + drive", "1 + spike").replace("    send: v", "    send: spike")
+    spec = spec.replace("signal: g + pre.g", "signal: g + spike + g*pre.spike").replace("o: E.v", "o: E.spike")
+    plain = at.replace("¦", "")
+    assert spec.count(plain) == 1
+    found = hover(*marked(spec.replace(plain, at)))
+    assert found is not None
+    assert told in found.markdown
+
+
 def test_a_rule_of_the_centre_is_offered_it_in_place_of_the_weight() -> None:
     rule = "neurovis: 1\nname: x\nrules:\n  near: {let: {d: ¦}, centre: {each_step: centre + 0.1*(pre - centre)}}\n"
     assert offered(rule).keys() >= {"centre", "pre", "sent"}

@@ -288,7 +288,7 @@ class SpikeModel(Model):
     }
 
     when: FormulaField = Field(description="It fires where this is true, as v >= threshold.")
-    set: Annotated[Named[FormulaField], naming("local")] = Field(
+    set: Annotated[Named[Annotated[FormulaField, IN_MODEL]], naming("local")] = Field(
         default_factory=dict, description="New values of states, all from old ones."
     )
     refractory: TimeField | None = Field(

@@ -26,7 +26,7 @@ from neurovis_spec.language.yaml.source import Scalar
 from neurovis_spec.lsp.definitions import Definition, definitions, known
 from neurovis_spec.lsp.document import Document, described, ports_of
 from neurovis_spec.lsp.index import Index
-from neurovis_spec.lsp.names import SECTIONS, Name, Scope, scope_of, setting_of
+from neurovis_spec.lsp.names import SECTIONS, Name, Scope, may_be_states, scope_of, setting_of
 from neurovis_spec.lsp.outline import Path, nodes_at
 from neurovis_spec.lsp.text import Place, Text
 from neurovis_spec.manual.words import functions_of
@@ -46,6 +46,8 @@ _NAMES = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 #: Of a larger group only the first and the last neuron are offered; of one that is larger than any, none.
 _FEW = 40
 _MANY = 999_999
+#: What is worked out within a step, where no spike is seen.
+_OF_STAGES: Final = ("derivative", "noise")
 #: A path that no document has, for asking what a key of a mapping is.
 _ANY = "\0"
 Sort = Literal["key", "neuron", "parameter", "input", "function", "constant", "definition", "word", "module", "local"]
@@ -199,7 +201,7 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from _formula(role, scope, path, index, place)
         case "ends" | "references":
             yield from _neurons(scope, front, index, single=path[-2:-1] == ("positions",))
-            if path[:1] == ("outputs",):
+            if may_be_states(path):
                 yield from _states(scope, front, index)
         case "settable":
             if not front.strip():
@@ -247,8 +249,13 @@ def _names(role: Role, scope: Scope, path: Path, index: Index) -> Iterator[_Offe
             yield from (_Offer(name.text, "word", "output") for name in index.declared("output"))
         case "local" if scope.definition is not None:
             own = ((name.text, str(name.item.path[2])) for name in index.locals(*scope.definition))
+            if "spike" in path:  # what a spike sets and holds
+                yield from (_Offer(name, "local", section) for name, section in own if section == "state")
+                return
             sent = ((name, section) for name, section in own if section in ("state", "outputs"))
             yield from (_Offer(name, "local", section) for name, section in (*sent, ("activity", "")))
+            if _knows_spike(scope.definition, index):
+                yield _Offer("spike", "local", GIVEN["spike"])
 
 
 def _of_body(role: Role | None, document: Document) -> Iterator[_Offer]:
@@ -299,12 +306,20 @@ def _formula(role: Role, scope: Scope, path: Path, index: Index, place: Place) -
         for name in index.locals(*scope.definition):
             if name.item.path[2] != "outputs":  # which formulas do not read
                 yield _Offer(name.text, "local", str(name.item.path[2]))
+        if path[-1] not in _OF_STAGES and _knows_spike(scope.definition, index):
+            yield _Offer("spike", "constant", GIVEN["spike"])
     centred = scope.definition is not None and (*scope.definition, "centre") in index.keys  # a rule of the centre
     for given in (*role.sees, *ALWAYS):
         told = "centre" if centred and given == "weight" else given
         yield _Offer(told, "constant", GIVEN[told])
     for word in functions_of(role).values():
         yield _Offer(word.name, "function", word.usage, word.about)
+
+
+def _knows_spike(definition: tuple[str, str], index: Index) -> bool:
+    """Whether formulas of a definition, by its section and name, know ``spike``."""
+    found = definitions(index.all_items).get(definition)
+    return found is not None and found.spike
 
 
 def _inner_inputs(module: str | None, index: Index) -> Iterator[_Offer]:
@@ -372,9 +387,10 @@ def _states(scope: Scope, front: str, index: Index) -> Iterator[_Offer]:
 
 
 def _states_of(index: Index, group: Path, outputs: bool = False) -> Iterator[_Offer]:
-    """The states of the model of the group at a path, and its outputs where these are wanted, too."""
+    """The states of the model of the group at a path, and its spike and outputs where these are wanted, too."""
     model = _model_of(index, group)
-    yield from (_Offer(name, "parameter", "state") for name in (() if model is None else model.states))
+    if model is not None:
+        yield from (_Offer(name, "parameter", "state") for name in (model.taken if outputs else model.states))
     if outputs and model is not None:
         yield from (_Offer(name, "parameter", "output") for name in model.outputs)
 
@@ -394,7 +410,7 @@ def _at_end(end: str, index: Index) -> Iterator[_Offer]:
     found = {"activity": f"activity at the {end} end"}
     for model in dict.fromkeys((*own, *(model for model in groups if model is not None))):
         for names, what in (
-            (model.states, "state"),
+            (model.taken, "state"),
             (model.outputs, "output"),
             ([one.name for one in model.parameters], "parameter"),
         ):
@@ -421,7 +437,7 @@ def _of_ends(use: Literal["port", "sent"], scope: Scope, path: Path, index: Inde
         if model is not None and use == "port":
             found |= dict.fromkeys(model.ports, "port")
         elif model is not None:
-            found |= {**dict.fromkeys(model.states, "state"), **dict.fromkeys(model.outputs, "output")}
+            found |= {**dict.fromkeys(model.taken, "state"), **dict.fromkeys(model.outputs, "output")}
     yield from (_Offer(name, "parameter", detail) for name, detail in found.items())
 
 

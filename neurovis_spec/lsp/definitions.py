@@ -37,7 +37,8 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """An activation, a model, a rule or a synapse. ``equations`` are lines ``name = expression``."""
+    """An activation, a model, a rule or a synapse. ``equations`` are lines ``name = expression``; ``spike`` says
+    whether its formulas know that name."""
 
     kind: Kind
     name: str
@@ -48,6 +49,12 @@ class Definition:
     states: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     ports: tuple[str, ...] = ()
+    spike: bool = False
+
+    @property
+    def taken(self) -> tuple[str, ...]:
+        """What of a model can be sent, shown and read at the ends of connections, beside its outputs."""
+        return (*self.states, "spike") if self.spike else self.states
 
     @property
     def usage(self) -> str:
@@ -148,10 +155,9 @@ def _definition(section: str, name: str, texts: Mapping[tuple[str, ...], str]) -
         for path, text in texts.items()
         if path[:1] == ("ports",) and len(path) < 3
     )
-    equations = _equations(section, texts)
-    return Definition(
-        DEFINITIONS[section], name, tuple(parameters), signals, equations, description, states, outputs, ports
-    )
+    kind, equations = DEFINITIONS[section], _equations(section, texts)
+    spike = kind == "synapse" or any("on_pre" in path or "on_post" in path or path[0] == "spike" for path in texts)
+    return Definition(kind, name, tuple(parameters), signals, equations, description, states, outputs, ports, spike)
 
 
 _AT_SPIKES: Final = {"on_pre": "when a spike arrives", "on_post": "when the target fires"}

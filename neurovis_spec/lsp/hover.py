@@ -268,6 +268,8 @@ def _setting(document: Document, name: Name) -> str | None:
             return f"{told}\n\n{parameter.description}" if parameter.description else told
     if name.text in definition.signals:
         return f"**{name.text}** (signal of {owner}): neurons or an input, of size 1 or of the size of the target"
+    if name.text == "spike" and definition.spike:
+        return f"`spike`: {GIVEN['spike']}"
     own = (f"{name.text} =", f"d{name.text}/dt ")
     lines = [line for line in definition.equations if line.startswith(own)]
     if not lines:

@@ -104,7 +104,7 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
             else:
                 yield from _formula(item, role, scope, text, lookup)
         case "ends" | "references":
-            yield from _references(item, scope, text, lookup, stately=_may_be_states(item.path))
+            yield from _references(item, scope, text, lookup, stately=may_be_states(item.path))
         case "settable" if isinstance(parse(item.text), Arrow):
             yield from _references(item, scope, text, lookup)
         case "settable":
@@ -128,7 +128,7 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
             yield _whole(item, role.kind, scope, text, declares)
 
 
-def _may_be_states(path: Path) -> bool:
+def may_be_states(path: Path) -> bool:
     """Whether references at a path may be to states: what leaves the network, and what is held."""
     return path[:1] == ("outputs",) or (path[:1] == ("events",) and path[2:3] == ("clamp",))
 
