@@ -551,8 +551,9 @@ class Send(Operation):
 
 @dataclass(frozen=True, slots=True)
 class Receive(Operation):
-    """What of the states of a synapse is made once a step, from old values: ``each_step`` before the ports of its
-    targets are made, ``each_episode`` when these are updated, so that the last signal of an episode is of before."""
+    """What of the states of a synapse is made once a step, from old values: ``on_pre``, then ``each_step``, before the
+    ports of its targets are made, ``each_episode`` when these are updated, so that the last signal of an episode is of
+    before. Without delay ``on_pre`` is behind all updates."""
 
     projection: int
     phases: tuple[Phase, ...]
