@@ -132,6 +132,16 @@ def test_sums_of_many_spikes_are_in_the_order_of_the_connections(backend: str, r
     np.testing.assert_array_equal(runs[1].weights, runs[0].weights)
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_states_are_held_where_spikes_come_in_any_order(backend: str) -> None:
+    """Those of some connections, by delays that differ, while spikes come to them and to others."""
+    text = MIXED.replace("DELAY", '"1 + (i + 5*j) % 4"').replace("REST", "plasticity: trade")
+    network = nv.compile_text(text.replace("E3: 1, E4: 0", "(E3..E30 -> E).a: 0.2, (E40 -> E).a: 0.4")).network
+    runs = [record(network, Course(14, backend=one, keep=Keep(states=("all",)))) for one in ("reference", backend)]
+    np.testing.assert_array_equal(runs[1].states, runs[0].states)
+    np.testing.assert_array_equal(runs[1].weights, runs[0].weights)
+
+
 TWO_PORTS = """
 neurovis: 1
 name: two_ports

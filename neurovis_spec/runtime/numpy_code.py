@@ -373,11 +373,11 @@ def held_among(fixed: Fixed, starts: Mapping[Key, tuple[int, IntArray | None]]) 
 
 
 def _among(some: IntArray | None, positions: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Which of ``some`` members, None for all, are at these positions, and what is held there."""
+    """Which of ``some`` members, None for all, in any order, are at these positions, and what is held there."""
     if some is None:
         return positions, values
-    there = np.isin(positions, some)
-    return np.searchsorted(some, positions[there]), values[there]
+    there = np.flatnonzero(np.isin(some, positions))
+    return there, values[np.searchsorted(positions, some[there])]
 
 
 def _may_alias(tree: Tree) -> bool:
