@@ -86,3 +86,33 @@ def test_an_episodes_end_reads_what_its_last_step_gave_and_computes_let_anew() -
 def test_without_episodes_each_episode_never_comes() -> None:
     a = nv.compile_text(ORDER.replace("time: {episode: 4}", "")).run(9)["A"].tolist()
     assert a == list(range(1, 10))
+
+
+@pytest.mark.parametrize("activity", ["v", "f(v)", "+v"])
+def test_the_activity_of_an_episodes_last_step_is_of_before_its_end(activity: str) -> None:
+    """Also where it is a state that nothing but an episode's end changes in an update."""
+    text = f"""
+neurovis: 1
+name: counted
+time: {{dt: 0.5, episode: 3, integrate: euler}}
+models:
+  clock: {{state: {{v: {{derivative: 2, each_episode: 0}}}}, activity: {activity}}}
+  rises: {{state: {{v: {{each_episode: v + 1}}}}, activity: {activity}}}
+neurons: {{A: {{count: 2, model: clock}}, B: {{count: 2, model: rises}}}}
+"""
+    for backend in ("reference", "numpy"):
+        run = nv.compile_text(text).run(7, backend=backend)
+        assert run["A1"].tolist() == [0, 1, 2, 1, 2, 3, 1]
+        assert run["B1"].tolist() == [0, 0, 0, 1, 1, 1, 2]
+
+
+def test_states_that_take_each_others_place_do_so_by_an_activation_that_is_the_identity() -> None:
+    """In the text of NumPy's step ``f(v)`` is then ``v``: the array that is about to change."""
+    text = """
+neurovis: 1
+name: swap
+models: {swap: {state: {u: {initial: 1, each_step: f(v)}, v: {each_step: f(u)}}, activity: u}}
+neurons: {A: {count: 2, model: swap}}
+"""
+    for backend in ("reference", "numpy"):
+        assert nv.compile_text(text).run(4, backend=backend)["A1"].tolist() == [0, 1, 0, 1]

@@ -233,7 +233,8 @@ class Code:
     def fresh(self, prefix: str, tree: Tree, known: Mapping[str, str], functions: Functions | None = None) -> str:
         """The value of an expression under a new identifier, and never an alias of an array that changes."""
         code = self.expression(tree, known, functions)
-        return self.let(prefix, f"np.array({code})" if _may_alias(tree) else code)
+        # an activation may be x itself, of which the code is that of what it is called with
+        return self.let(prefix, f"np.array({code})" if _may_alias(tree) or code.isidentifier() else code)
 
     def text(self) -> str:
         """The steps as Python text. What stays the same over all of them is looked up before the first."""
@@ -291,6 +292,9 @@ def emit_change(
     if episode is not None and any(tree is not None for tree in ends.values()):
         code.line(f"if (k + 1) % {episode} == 0:")
         code.indent += 1
+        for name, made in fleeting_names.items():
+            if name not in cells:  # it may be a state itself, which is about to change
+                code.line(f"{made} = np.array({made})")
         change.replace(ends, {})
         code.indent -= 1
     return fleeting_names
