@@ -27,7 +27,7 @@ TRACES = """
 neurovis: 1
 name: traces
 seed: 4
-time: {dt: 1 ms, integrate: METHOD}
+time: {dt: 1 ms, integrate: {method: METHOD, substeps: 2}}
 parameters: {fade: 6, up: 0.1, gain: 1}
 models:
   cell:
@@ -45,7 +45,8 @@ rules:
       slow: {initial: 0.5, derivative: (a - slow)/slower}
       b: {derivative: -b/4, on_post: b - down}
       seen: {on_pre: seen + a + 0.1*b}
-    weight: {on_pre: weight + b + 0.01*slow, on_post: weight + a}
+      drift: {derivative: 0.3*(a + pre.v - drift)}
+    weight: {on_pre: weight + b + 0.01*slow, on_post: weight + a - 0.01*drift}
   count: {state: {n: {each_step: 0.9*n, on_post: n + 1}}, weight: {each_step: weight - 0.001*n*pre}}
 synapses:
   tired:
@@ -55,7 +56,7 @@ synapses:
       u: {derivative: -u/30, on_pre: u1}
       x: {initial: 1, derivative: (1 - x)/20, on_pre: x - u1*x}
       g: {derivative: -g/3, on_pre: g + u1*x*weight}
-    signal: g
+    signal: g*(1 + 0.1*x)
 neurons:
   A: {count: 8, model: cell, bias: "uniform(1, 2.5)", initial: {v: "uniform(0, 1)"}}
   B: {count: 6, model: cell, bias: "gain*uniform(0.8, 2)", initial: {v: "uniform(0, 1)"}}
@@ -163,7 +164,9 @@ def test_what_is_kept_once_reads_itself_and_one_side_alone(state: str, names: se
         "neurons: {A: {count: 3, model: cell}, B: {count: 2, model: cell}}\n"
         "connections: {A -> B: {weight: 1, pattern: all_to_all, port: kick, plasticity: own}}\n"
     )
-    network = nv.compile_text(text.replace("METHOD", "euler, episode: 9")).network
+    network = nv.compile_text(
+        text.replace("substeps: 2}", "substeps: 2}, episode: 9").replace("METHOD", "euler")
+    ).network
     assert {name[2:] for name in kept(network)} == names
 
 

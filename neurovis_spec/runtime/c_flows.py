@@ -524,8 +524,11 @@ class _StageSight(Sight):
         found, use = super().states(some), self.network.projections[some.number].use
         place, stage = self.code.at(some.which, some.place), "fy" if "fy" in self.plan.parts else "fx"
         for name in found:
-            if (start := self.plan.starts.get(Key(use.owner, name))) is not None:
-                found[name] = f"{stage}[{plus(start, place)}]"
+            key, at = Key(use.owner, name), place
+            if (once := self.ends.kept.get(key)) is not None:
+                key, at = Key(once.owner, name), self.among_kept(once, place)
+            if (start := self.plan.starts.get(key)) is not None:
+                found[name] = f"{stage}[{plus(start, at)}]"
         return found
 
     def clock(self, made: Definition) -> dict[str, Value]:
