@@ -130,20 +130,22 @@ class Sight:
 
     def states(self, some: Some) -> dict[str, str]:
         """The states of a synapse or a rule at one connection."""
-        return self.cells(self.network.projections[some.number].use, self.code.at(some.which, some.place))
+        return self.cells(self.network.projections[some.number].use, some.place, some.which)
 
-    def cells(self, use: Use, place: Place) -> dict[str, str]:
-        """The states of a definition in use, and its outputs, of one member, wherever they are kept."""
-        found = {one.name: f"{state_name(use.owner, i)}[{place}]" for i, one in enumerate(use.definition.kept)}
+    def cells(self, use: Use, place: Place, which: Indices | None = None) -> dict[str, str]:
+        """The states of a definition in use, and its outputs, of one member, or of ``which`` members one, wherever they
+        are kept."""
+        own = place if which is None else self.code.at(which, place)
+        found = {one.name: f"{state_name(use.owner, i)}[{own}]" for i, one in enumerate(use.definition.kept)}
         for name in found if self.ends.kept else ():
             if (once := self.ends.kept.get(Key(use.owner, name))) is not None:
-                found[name] = f"{state_name(once.owner, once.number)}[{self.among_kept(once, place)}]"
+                found[name] = f"{state_name(once.owner, once.number)}[{self.among_kept(once, place, which)}]"
         return found
 
-    def among_kept(self, once: Kept, place: Place) -> Place:
+    def among_kept(self, once: Kept, place: Place, which: Indices | None = None) -> Place:
         """Where a state that is kept once for many stands, of one connection."""
-        order = self.code.order
-        return self.code.at(once.of, place) if order is None else self.code.at(once.of[order], "e")
+        of, order = once.of if which is None else once.of[which], self.code.order
+        return self.code.at(of, place) if order is None else self.code.at(of[order], "e")
 
     def clock(self, made: Definition) -> dict[str, Value]:
         """``t`` and ``dt`` where they are in another unit than seconds."""

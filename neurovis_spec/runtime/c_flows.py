@@ -526,7 +526,7 @@ class _StageSight(Sight):
         for name in found:
             key, at = Key(use.owner, name), place
             if (once := self.ends.kept.get(key)) is not None:
-                key, at = Key(once.owner, name), self.among_kept(once, place)
+                key, at = Key(once.owner, name), self.among_kept(once, some.place, some.which)
             if (start := self.plan.starts.get(key)) is not None:
                 found[name] = f"{stage}[{plus(start, at)}]"
         return found

@@ -22,6 +22,7 @@ from neurovis_spec.compiler.events.settable import Variable
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
     AT_SPIKE,
+    RULE,
     Definition,
     Integrate,
     Key,
@@ -36,7 +37,7 @@ from neurovis_spec.compiler.program import (
     Use,
 )
 from neurovis_spec.language.expressions.tree import Tree
-from neurovis_spec.runtime.events import Rows, rows_of
+from neurovis_spec.runtime.events import Rows, rows_of, weights_stay
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.stages import ends_of, unfolded
 from neurovis_spec.runtime.state import constants
@@ -108,21 +109,17 @@ class _Side(NamedTuple):
 def _sides(network: Network, number: int) -> Iterator[_Side]:
     """What of a projection can be kept once for each row of either end."""
     projection = network.projections[number]
-    made, parameters = projection.use.definition, projection.use.parameters
+    made, fixed = projection.use.definition, _fixed(network, projection)
     if any(one.each_episode is not None for one in made.lasting):
         return  # at an episode's end formulas read what the step has just made
-    clock = {*constants(network.dt), "k", "t"}
+    clock: Set[str] = {*constants(network.dt), "k", "t"}
     for phase in sorted(made.acts & AT_SPIKE.keys()):
-        if not _alike(made, phase, clock | parameters.keys()):
+        if not _alike(made, phase, clock | fixed.keys()):
             continue
         end, delays = ends_of(network, projection)[AT_SPIKE[phase]], network.connections.delays[projection.members]
         rows = rows_of(end.places, delays if end.past else np.zeros_like(delays))
         first, of = _members(rows)
-        known = {
-            name
-            for name in parameters
-            if _is_alike(network, Key(projection.use.owner, name), parameters[name], first, of)
-        }
+        known = {name for name, values in fixed.items() if values is None or _same(values, values[first][of])}
         names = _alike(made, phase, clock | known)
         if names and len(first) < len(of):
             yield _Side(number, AT_SPIKE[phase], names, first, of)
@@ -135,12 +132,22 @@ def _members(rows: Rows) -> tuple[IntArray, Indices]:
     return np.asarray(rows.order[rows.starts[:-1]], dtype=np.int64), of
 
 
-def _is_alike(network: Network, key: Key, values: FloatArray, first: IntArray, of: Indices) -> bool:
-    """Whether a parameter is the same, by its bits, at all members of a row, whatever is set in a run."""
-    variable = network.settable.variables.get(key)
-    if variable is not None:
-        return variable.size == 1
-    return np.array_equal(values.view(np.int64), values[first][of].view(np.int64))
+def _fixed(network: Network, projection: Projection) -> Mapping[str, FloatArray | None]:
+    """What formulas of a projection read that no step changes, and that is the same for all (None) or has these values:
+    parameters but those that can be set each for itself, and weights that stay."""
+    found = dict[str, FloatArray | None]()
+    for name, values in projection.use.parameters.items():
+        variable = network.settable.variables.get(Key(projection.use.owner, name))
+        if variable is None or variable.size == 1:
+            found[name] = values if variable is None else None
+    if RULE.gives in projection.read and weights_stay(network)[projection.members].all():
+        found[RULE.gives] = network.connections.weights[projection.members]
+    return found
+
+
+def _same(one: FloatArray, other: FloatArray) -> bool:
+    """Whether numbers are the same, by their bits: 0.0 and −0.0 are two."""
+    return np.array_equal(one.view(np.int64), other.view(np.int64))
 
 
 def _alike(made: Definition, phase: Phase, known: Set[str]) -> tuple[str, ...]:
