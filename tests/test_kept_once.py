@@ -211,6 +211,23 @@ def test_runs_in_pieces_are_those_of_the_reference(events: str, delay: str, rule
 
 @pytest.mark.compiler
 @pytest.mark.usefixtures("loops")
+def test_weights_of_a_state_that_somebody_has_changed_count() -> None:
+    text = TRACES[: TRACES.index("  A -> B")] + "  A -> A: {weight: 0.1, pattern: all_to_all, synapse: fading}\n"
+    network = nv.compile_text(text.replace("METHOD", "heun")).network
+    assert written(network).once
+    found = []
+    for backend in ("reference", "c"):
+        state = initial_state(network)
+        state.weights[[1, 7]] = 0.7, -0.3
+        course = Course(12, backend=backend)
+        run_steps(network, state, course, InMemory(columns_of(network, course.keep).widths(network), 12))
+        found.append(arrays(state))
+    for name, expected in found[0].items():
+        np.testing.assert_array_equal(found[1][name], expected, name)
+
+
+@pytest.mark.compiler
+@pytest.mark.usefixtures("loops")
 def test_what_is_kept_once_is_what_each_connection_would_have(monkeypatch: pytest.MonkeyPatch) -> None:
     """To the bit, zeros among it; and where states are recorded, each connection has its own."""
     network, steppers = traces("exponential", "2", events=EVENTS["set"]), list[CStepper]()

@@ -32,18 +32,27 @@ def pointer_lines(once: Once) -> dict[str, str]:
 
 
 def gather(once: Once, code: Code) -> None:
-    """Each state from the first of its connections; gives whether it is that of all of them, by its bits."""
+    """Each state from the first of its connections; gives whether it is that of all of them, and what it is made of, by
+    its bits."""
     code.line("uint64_t differ = 0;")
     for key, kept in once.kept.items():
         own, whole = state_name(kept.owner, kept.number), _whole(once, key)
         with code.block(code.loop("p", len(kept.first))):
             code.line(f"{own}[p] = {whole}[{code.at(kept.first, 'p')}];")
-        with code.block(code.loop("q", len(kept.of))):
-            code.line("uint64_t one, other;")
-            code.line(f"memcpy(&one, {own} + {code.at(kept.of, 'q')}, sizeof one);")
-            code.line(f"memcpy(&other, {whole} + q, sizeof other);")
-            code.line("differ |= one ^ other;")
+        _compare(code, len(kept.of), f"{own} + {code.at(kept.of, 'q')}", f"{whole} + q")
+        if kept.weights is not None:
+            first = kept.weights[kept.first][kept.of]
+            _compare(code, len(first), f"weights + {code.at(first, 'q')}", f"weights + {code.at(kept.weights, 'q')}")
     code.line("return !differ;")
+
+
+def _compare(code: Code, count: int, first: str, second: str) -> None:
+    """So many pairs of numbers, of which code says where they are for each ``q``."""
+    with code.block(code.loop("q", count)):
+        code.line("uint64_t one, other;")
+        code.line(f"memcpy(&one, {first}, sizeof one);")
+        code.line(f"memcpy(&other, {second}, sizeof other);")
+        code.line("differ |= one ^ other;")
 
 
 def scatter(once: Once, code: Code) -> None:

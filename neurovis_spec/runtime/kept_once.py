@@ -48,12 +48,14 @@ ONCE: Final = Kind("once", "connection", "nothing")
 
 class Kept(NamedTuple):
     """Where a state of connections is kept once: which state of which owner it is there; for each connection, by its
-    position in its projection, of which member; and of each member the first connection."""
+    position in its projection, of which member; and of each member the first connection. ``weights``: the connections
+    whose weights have to be alike, too, where formulas read them."""
 
     owner: Owner
     number: int
     of: Indices
     first: IntArray
+    weights: IntArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +88,11 @@ def kept_once(network: Network) -> Once | None:
     projections, kept = list(network.projections), dict[Key, Kept]()
     for side in sides:
         owner, whole = Owner(ONCE.name, len(projections)), network.projections[side.number]
-        for number, name in enumerate(side.names):
-            kept[Key(whole.use.owner, name)] = Kept(owner, number, side.of, side.first)
         projections[side.number] = _without(projections[side.number], side.names)
         projections.append(_alone(whole, owner, side))
+        weights = whole.members if RULE.gives in projections[-1].read else None
+        for number, name in enumerate(side.names):
+            kept[Key(whole.use.owner, name)] = Kept(owner, number, side.of, side.first, None if number else weights)
     program = tuple(one for operation in network.program for one in _apart(operation, sides, projections))
     found = replace(network, projections=tuple(projections), program=program)
     return Once(network, found, kept) if history_depth(found) == history_depth(network) else None
