@@ -121,6 +121,48 @@ render: {show: {A: both}}
 """
 
 
+SPIKES = """neurovis: 1
+name: firing
+time: {dt: 1 ms, steps: 40, episode: 15}
+parameters: {gain: 1.4, rest: {value: 2, unit: ms}, rate: {value: 150, min: 0, max: 900}}
+inputs: {rain: {size: 2, poisson: rate}, train: {spikes: {times: [[0.002, 0.005, 0.006]]}}, push: {}}
+models:
+  cell:
+    time: ms
+    parameters: {tau: {value: 8, unit: ms}, rest: 2}
+    ports: [kick]
+    let: {high: 1 + 0.01*drive}
+    state:
+      v: {initial: 0.4, derivative: (drive - v)/tau, noise: 0.05, jump: kick}
+      w: {each_step: 0.9*w + spike}
+    spike: {when: v >= high, set: {v: v - 1}, refractory: rest, hold: v}
+    send: spike
+modules:
+  leg:
+    parameters: {w: 0.3}
+    inputs: {load: {}}
+    neurons: {S: {model: spike_source, input: load}, C: {count: 2, model: cell, bias: 1.2}}
+    connections:
+      S -> C: {weight: w, pattern: all_to_all, port: kick, plasticity: stdp}
+      C -> C: {weight: -w, pattern: ring, port: kick, synapse: exponential}
+neurons:
+  R: {count: 2, model: spike_source, input: rain}
+  A: {count: 2, model: {cell: {rest: rest}}, bias: gain, input: push}
+instances: {left: {module: leg, count: 2, inputs: {load: train}}, right: {module: leg, set: {w: gain/2}}}
+connections:
+  R -> A: {weight: 0.5, pattern: all_to_all, port: kick, delay: 2 ms, plasticity: stdp_triplet}
+  A -> left.C: {weight: 0.4, pattern: all_to_all, port: kick, delay: 0}
+  right.C -> A: {weight: 0.5, pattern: one_to_one, synapse: tsodyks_markram, port: kick, delay: 3}
+events:
+  - {from: 4, to: 12, clamp: {A1.v: gain}}
+  - {from: 6, to: 9, clamp: {left1.C2: 1}}
+  - {at: 9, set: {rest: 2*rest, rate: 3*rate}}
+  - {at: 11, lesion: [A2]}
+  - {at: 14, mend: [A2]}
+outputs: {seen: A.w}
+"""
+
+
 #: What can be turned: in order neurons, connections, rules, inputs, and parameters with the values that they are given.
 @dataclass(frozen=True)
 class Kind:
@@ -168,11 +210,19 @@ _FLOWING = (
     ["push"],
     ["gain", "pull"],
 )
+_FIRING = (
+    ["R", "A", "A2", "left.C", "left1.C2", "right.S"],
+    ["R -> A", "A -> left.C", "right.C -> A", "left.C -> left.C"],
+    ["R -> A", "left1.S -> left1.C"],
+    ["push"],
+    ["gain", "rest", "rate"],
+)
 _CARTED = (["P", "A1", "O"], ["P -> O", "W -> O"], ["W -> O"], ["place", "arms"], ["gain", "much"])
 KINDS = {
     "plain": Kind(lambda: nv.compile_text(SPEC), *_PLAIN),
     "parts": Kind(lambda: nv.compile_text(PARTS), *_LEGS),
     "flows": Kind(lambda: nv.compile_text(FLOWS), *_FLOWING),
+    "spikes": Kind(lambda: nv.compile_text(SPIKES), *_FIRING),
     "body": Kind(lambda: carted(spec=_CART), *_CARTED),
     "whole body": Kind(lambda: carted("whole", spec=_CART), *_CARTED),
     "short body": Kind(lambda: carted("short", spec=_CART, each_episode=False), *_CARTED),
