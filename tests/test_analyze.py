@@ -6,6 +6,7 @@ import base64
 import csv
 import json
 import re
+from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -96,6 +97,25 @@ def test_tables_hold_the_numbers_that_python_gives(folder: Path) -> None:
     assert [[float(cell) for cell in row[1:]] for row in rows[1:]] == expected.values.tolist()
     table = json.loads((folder / "out" / "correlation.json").read_text(encoding="utf-8"))
     assert table["values"] == expected.values.tolist()
+
+
+def test_all_of_it_is_one_object_of_json(folder: Path) -> None:
+    """The tables are those of the files; what is said is what the page says."""
+    result = call("analyze small.yaml --no-trials -o out --format json")
+    assert (result.exit_code, result.stderr) == (0, "")
+    told = json.loads(result.stdout)
+    out = folder / "out"
+    assert sorted(told["files"]) == sorted(path.name for path in out.iterdir())
+    assert (told["folder"], told["network"], told["hash"]) == ("out", "small", nv.compile("small.yaml").hash)
+    assert [one["measure"] for one in told["measures"]] == [key for key in catalogue() if key not in OF_SPIKES]
+    page = unescape((out / "index.html").read_text(encoding="utf-8"))
+    for one in told["measures"]:
+        assert one["title"] in page
+        assert all(note in page for note in one["notes"])
+        assert all((out / f"{name}.svg").is_file() for name in one["pictures"])
+        for name, table in one["tables"].items():
+            assert table == json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
+    assert told["measured"]["steps"] in page
 
 
 def test_neurons_without_connections_among_them_are_shown_with_all_that_they_are_connected_to(folder: Path) -> None:

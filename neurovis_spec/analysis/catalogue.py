@@ -16,10 +16,13 @@ INTRODUCTION = """# Measures
 
 What the NeuroVis paper measures, and each technique of its Table 1 that measures something, is one call here.
 `neurovis analyze SPEC -o FOLDER` makes them all into tables (CSV and JSON), pictures (SVG) and a page that says what
-they mean (it needs the extra `analyze`). In Python each takes a recording, or a compiled network where it has to run
-it, and returns a named array: `table["K2", "K3"]`, `table.row("K2")`, `table.column("last")`, `numpy.asarray(table)`.
+they mean (it needs the extra `analyze`); with `--format json` it prints the tables and what is said of them as one
+object, too: `measures`, each with its `notes`, `tables` (as in their JSON files) and `pictures`. In Python each takes
+a recording, or a compiled network where it has to run it, and returns a named array: `table["K2", "K3"]`,
+`table.row("K2")`, `table.column("last")`, `numpy.asarray(table)`.
 `of` chooses neurons (`"K"`, `"C + K"`, `["K1", "O"]`), `start` and `stop` choose steps. The folder of
-`neurovis analyze` is `neurovis_spec.analysis.report.analyze(network, folder, recording)`.
+`neurovis analyze` is `neurovis_spec.analysis.report.analyze(network, folder, recording)`, the object `measure(network,
+recording).plain`.
 
 The examples are of use case 1, the last twenty periods, and, where neurons spike, of the one that hears where a sound
 is. They are tested:

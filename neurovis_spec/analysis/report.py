@@ -40,7 +40,7 @@ from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.excerpt import excerpt
 from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.fitting import fitted
-from neurovis_spec.runtime.named_array import Axis, NamedArray, csv_of, json_of
+from neurovis_spec.runtime.named_array import Axis, NamedArray, csv_of, json_of, plain_of
 from neurovis_spec.runtime.pairwise import THRESHOLD, coactivation, cross_correlation, mutual_information
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene.model import Scene, Theme
@@ -92,6 +92,68 @@ def file_names() -> tuple[str, ...]:
     return (PAGE, *(f"{stem}{suffix}" for stem in stems for suffix in (".csv", ".json", ".svg")))
 
 
+@dataclass(frozen=True)
+class Measured:
+    """A report before it is written: of which network, what was measured, in words, what each measure found, and the
+    page."""
+
+    network: CompiledNetwork
+    settings: Mapping[str, str]
+    readings: tuple[Reading, ...]
+    page: bytes
+
+    @property
+    def plain(self) -> dict[str, object]:
+        """All but the pictures, as JSON has it: tables as in their files, of pictures the names."""
+        entries = catalogue()
+        measures = [
+            {
+                "measure": one.key,
+                "title": entries[one.key].title,
+                "notes": list(one.notes),
+                "tables": {name: plain_of(table) for name, table in one.tables.items()},
+                "pictures": list(one.pictures),
+            }
+            for one in self.readings
+        ]
+        about = {"network": self.network.name, "hash": self.network.hash, "measured": dict(self.settings)}
+        return {**about, "measures": measures}
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write it into a folder, which is made if it is not there; gives the files. Raises OSError."""
+        files: dict[str, bytes] = {}
+        for reading in self.readings:
+            for name, table in reading.tables.items():
+                files[f"{name}.csv"], files[f"{name}.json"] = csv_of(table).encode(), json_of(table).encode()
+            files |= {f"{name}.svg": content for name, content in reading.pictures.items()}
+        files[PAGE] = self.page
+        place = Path(folder)
+        place.mkdir(exist_ok=True)
+        for name, content in files.items():
+            with replacing(place / name) as file:
+                file.write(content)
+        return [place / name for name in files]
+
+
+def measure(
+    network: CompiledNetwork,
+    recording: Recording | None = None,
+    options: ReportOptions | None = None,
+    progress: Progress | None = None,
+) -> Measured:
+    """Measure a recording, or a run as long as ``time.steps``. Raises what the measures raise, ImportError without the
+    extra ``analyze``."""
+    asked = ReportOptions() if options is None else options
+    if recording is None:
+        run = network.run(inputs=asked.inputs, progress=progress)
+    else:
+        run = fitted(recording, network.network)
+    report = _Report(network, cut(run, asked.start, asked.stop), asked, recording is not None, progress)
+    readings, settings = tuple(report.readings()), report.settings()
+    page = page_of(_shown(readings), network, report.recording, report.theme, settings)
+    return Measured(network, settings, readings, page)
+
+
 def analyze(
     network: CompiledNetwork,
     folder: str | Path,
@@ -101,25 +163,7 @@ def analyze(
 ) -> list[Path]:
     """Write the report of a recording, or of a run as long as ``time.steps``, into a folder, which is made if it is not
     there; gives the files. Raises what the measures raise, ImportError without the extra ``analyze``, OSError."""
-    asked = ReportOptions() if options is None else options
-    place = Path(folder)
-    if recording is None:
-        run = network.run(inputs=asked.inputs, progress=progress)
-    else:
-        run = fitted(recording, network.network)
-    report = _Report(network, cut(run, asked.start, asked.stop), asked, recording is not None, progress)
-    readings = list(report.readings())
-    files: dict[str, bytes] = {}
-    for reading in readings:
-        for name, table in reading.tables.items():
-            files[f"{name}.csv"], files[f"{name}.json"] = csv_of(table).encode(), json_of(table).encode()
-        files |= {f"{name}.svg": content for name, content in reading.pictures.items()}
-    files[PAGE] = page_of(_shown(readings), network, report.recording, report.theme, report.settings())
-    place.mkdir(exist_ok=True)
-    for name, content in files.items():
-        with replacing(place / name) as file:
-            file.write(content)
-    return [place / name for name in files]
+    return measure(network, recording, options, progress).write(folder)
 
 
 def _shown(readings: Sequence[Reading]) -> list[Shown]:

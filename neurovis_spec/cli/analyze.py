@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -89,6 +90,7 @@ measuring_options: Final = as_one(
         "neurovis analyze first.yaml -o readings",
         "neurovis analyze first.yaml --of K --from 9428 -o readings",
         "neurovis analyze first.yaml --recording first.npz --no-trials -o readings",
+        "neurovis analyze first.yaml -o readings --format json | jq .measures[].notes",
         "neurovis analyze hexapod.yaml --of left.CF+right.CF --threshold 0.5 --from 120 --to 360 -o gait",
     )
 )
@@ -104,6 +106,9 @@ measuring_options: Final = as_one(
 @click.option("--recording", metavar="FILE", shell_complete=paths, help="Measure this; without it the network is run.")
 @run_option
 @measuring_options
+@click.option(
+    "--format", "form", type=click.Choice(["text", "json"]), default="text", help="text (default) or a JSON object."
+)
 @set_option
 @input_option
 @body_options
@@ -113,6 +118,7 @@ def command(
     recording: str | None,
     run: int | None,
     measuring: Measuring,
+    form: str,
     settings: dict[str, float | str],
     inputs: dict[str, str],
 ) -> None:
@@ -121,7 +127,9 @@ def command(
     The page says what each measure means. The measures are those of the NeuroVis paper: connection matrix, traces,
     topography, cross-correlation, mutual information, co-activation, weights and their updates, the gait diagram, and
     what the outputs lose and gain with each part; where neurons spike their rates, intervals and cross-correlograms,
-    and rates over episodes. What cannot be measured is left out, and the page says why.
+    and rates over episodes. What cannot be measured is left out, and the page says why. With --format json the tables
+    and what is said of them are printed, too, as an object: measures, each with its notes, tables and the names of its
+    pictures, and the files.
     """
     need_run(inputs, recording)
     start, stop = measuring.start, measuring.stop
@@ -129,7 +137,7 @@ def command(
         raise click.UsageError(f"--to {stop} is not behind --from {start}: there is no step to measure")
     if find_spec("jinja2") is None:
         raise fault("the page needs jinja2, which is not installed", "pip install 'neurovis-spec[analyze]'")
-    from neurovis_spec.analysis.report import ReportOptions, analyze, file_names
+    from neurovis_spec.analysis.report import ReportOptions, file_names, measure
 
     check_folder(output)
     read = [("the spec itself", spec), ("the recording that is measured", recording), *files_of(inputs)]
@@ -151,7 +159,12 @@ def command(
         inputs=arrays,
     )
     with progress("measuring") as bar, writing(output):
-        files = analyze(network, output, record, options, bar)
+        made = measure(network, record, options, bar)
+        files = made.write(output)
+    if form == "json":
+        written = {"folder": str(output), "files": [file.name for file in files]}
+        click.echo(json.dumps({**made.plain, **written}, indent=2, ensure_ascii=False, allow_nan=False))
+        return
     _print_firing(files)
     click.echo(f"{output}: {count(len(files), 'file')}; open {output / 'index.html'}")
 

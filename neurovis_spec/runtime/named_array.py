@@ -97,13 +97,17 @@ def _written(value: float) -> str:
     return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
 
 
-def json_of(table: NamedArray) -> str:
-    """An object: ``name``, ``unit``, ``rows`` and ``columns`` ({name, labels}), ``values`` row by row."""
-    content = {
+def plain_of(table: NamedArray) -> dict[str, object]:
+    """``name``, ``unit``, ``rows`` and ``columns`` ({name, labels}), ``values`` row by row; None for no number."""
+    return {
         "name": table.name,
         "unit": table.unit,
         "rows": {"name": table.rows.name, "labels": table.rows.labels},
         "columns": {"name": table.columns.name, "labels": table.columns.labels},
         "values": [[value if math.isfinite(value) else None for value in row] for row in table.values.tolist()],
     }
-    return json.dumps(content, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def json_of(table: NamedArray) -> str:
+    """That as an object, in a line."""
+    return json.dumps(plain_of(table), ensure_ascii=False, allow_nan=False) + "\n"
