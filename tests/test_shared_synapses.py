@@ -33,7 +33,7 @@ from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_states
-from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
 from neurovis_spec.scene.ends import ends_of
 
@@ -390,3 +390,31 @@ def test_inspect_says_what_is_done_when() -> None:
         "on_pre A -> B g, h",
         "on_pre A -> B weight",
     ]
+
+
+HIDDEN = """\
+neurovis: 1
+name: hidden
+time: {dt: 1 ms, steps: 30}
+parameters: {q: 1}
+models:
+  cell: {time: ms, parameters: {q: 1}, state: {v: {derivative: (drive - v)/9}}, spike: {when: v >= 1, set: {v: 0}}}
+synapses:
+  receptor:
+    shared: true
+    time: ms
+    parameters: {U: {value: 1, max: 2}}
+    state: {g: {derivative: -g/5, on_pre: "g + U*min(weight/pre.q, 2)"}}
+    signal: g
+neurons: {A: {count: 3, model: {cell: {q: q}}, bias: 1.5}, B: {model: cell}}
+connections: {A -> B: {synapse: {receptor: {U: q}}, pattern: all_to_all}}
+"""
+
+
+@pytest.mark.parametrize("backend", ["reference", *BACKENDS])
+def test_what_is_undefined_in_what_is_added_is_told_of_the_synapse(backend: str) -> None:
+    network = nv.compile_text(f"{HIDDEN}events: [{{at: 12, set: {{q: 0}}}}]\n")
+    with pytest.warns(RuntimeWarning, match="the synapse 'receptor' divides by 0 for A1 -> B"):
+        network.run(30, backend=backend)
+    with pytest.raises(ParameterError, match="the parameter 'U' of a synapse would be above its bound of 2"):
+        nv.compile_text(HIDDEN).simulator(backend=backend).set(q=3)

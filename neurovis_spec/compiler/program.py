@@ -98,6 +98,13 @@ class Kind:
     lasting: bool = False
     #: whether it is a function of what is called ``x`` in it, for formulas of others
     function: bool = False
+    #: the kind that it is a part of, as authors know it
+    part_of: str = ""
+
+    @property
+    def noun(self) -> str:
+        """What it is called in messages."""
+        return self.part_of or self.name
 
     @property
     def section(self) -> str:
@@ -114,7 +121,7 @@ RULE = Kind("rule", "connection", "weight", lasting=True)
 #: What a connection brings to its ports, from its weight, what is known of both ends, and states of its own.
 SYNAPSE = Kind("synapse", "connection", "signal")
 #: What connections add to states of a shared synapse, of which there is one for all of an entry at a target.
-FEED = Kind("feed", "connection", "added", lasting=True)
+FEED = Kind("feed", "connection", "added", lasting=True, part_of=SYNAPSE.name)
 #: Of what makes synapses.
 JOINING: Final = (SYNAPSE, FEED)
 

@@ -185,7 +185,7 @@ class _Checks:
                 found.setdefault(phase, []).append(made)
         through = {phase: through_let(some, definition.let, functions) for phase, some in found.items()}
         check = _check(
-            f"{definition.kind.name} '{definition.name}'",
+            f"{definition.kind.noun} '{definition.name}'",
             {phase: some.found for phase, some in through.items()},
             self.fixed(use),
         )

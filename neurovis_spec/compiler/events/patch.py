@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Settable
-from neurovis_spec.compiler.program import Key
+from neurovis_spec.compiler.program import FEED, Key
 from neurovis_spec.language.expressions.emit import defined, emit
 from neurovis_spec.language.expressions.evaluate import Value
 from neurovis_spec.language.expressions.functions import NUMPY, Library
@@ -257,6 +257,7 @@ def _code(formula: object, space: dict[str, object], library: Library) -> str:
 def _name_in_message(array: Key) -> str:
     """What a number of the array is called in a message."""
     kind = array.name if array.owner is None else array.owner.kind
+    kind = FEED.noun if kind == FEED.name else kind
     if kind in _NAMES_IN_MESSAGES:
         return _NAMES_IN_MESSAGES[kind]
     return f"the parameter '{array.name}' of {'an' if kind[0] in _VOWELS else 'a'} {kind}"
