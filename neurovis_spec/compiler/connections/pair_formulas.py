@@ -31,7 +31,7 @@ from neurovis_spec.likeness import suggest
 #: What differs from pair to pair.
 _OF_A_PAIR = ("i", "j", "distance")
 #: Numbers of pairs that are made at once.
-_CELLS = 1 << 17
+_CELLS = 1 << 18
 
 
 class At(NamedTuple):

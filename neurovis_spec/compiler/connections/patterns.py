@@ -85,7 +85,7 @@ def _least_random(n: int, m: int, values: Values) -> int:
 
 
 def _least_counted(n: int, m: int, values: Values) -> int:
-    return int(values.counts.sum())
+    return int(values.counts.sum(dtype=np.float64))  # there may be more than an integer of 64 bits holds
 
 
 def _count_misfit(ends: Ends, values: Values, of: str, others: str) -> _Misfit | None:

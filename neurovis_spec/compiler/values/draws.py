@@ -104,7 +104,7 @@ def _word(part: Indices) -> LongArray:
 class Stream:
     """The numbers of one purpose and name under a seed.
 
-    The purpose is one of ``weight``, ``centre``, ``edges``, ``delay``, ``bias``, ``initial``, ``noise``,
+    The purpose is one of ``weight``, ``centre``, ``edges``, ``count``, ``delay``, ``bias``, ``initial``, ``noise``,
     ``input``; the name that of the group or input with the path of its instance (``left1.K``), or that of the entry
     behind the path of the instance that declares it (``left1/K -> O``; an entry ``left1.K -> O`` around the instance
     draws by itself).
