@@ -368,6 +368,46 @@ def test_a_parquet_without_its_reader(tmp_path: Path, monkeypatch: pytest.Monkey
     assert "pyarrow, which is not installed" in message
 
 
+LEG = "modules: {leg: {parameters: {g: 1}, neurons: {A: {bias: g}, K: {}}, connections: {A -> K: g}}}\n"
+
+
+def test_instances_have_names(tmp_path: Path) -> None:
+    """Of a list or of a table; all of them together are called as the entry is."""
+    (tmp_path / "legs.csv").write_text("leg,side\nfront,left\nhind,left\nother,right\n")
+    rest = "connections: {legs.K -> front.A: 0.5, hind.K -> front.K: 1}\n"
+    listed = compiled(LEG + "instances: {legs: {module: leg, names: [front, hind], set: {g: i + 2}}}\n" + rest)
+    assert listed.network.neurons.names == ("front.A", "front.K", "hind.A", "hind.K")
+    assert listed.network.neurons.bias.tolist() == [2, 0, 3, 0]
+    assert [(one.path, one.declared, one.number) for one in listed.network.instances] == [
+        ("front", "legs", 1),
+        ("hind", "legs", 2),
+    ]
+    table = "{file: legs.csv, column: leg, where: {side: left}}"
+    text = LEG + f"instances: {{legs: {{module: leg, names: {table}, set: {{g: i + 2}}}}}}\n" + rest
+    assert compiled(text, tmp_path).hash == listed.hash
+    assert nv.compile_text(compiled(text, tmp_path).text()).hash == listed.hash
+    twice = text.replace("instances: {", "instances: {hind: {module: leg}, ")
+    for one in (twice, text.replace("i + 2}}}", "i + 2}}, hind: {module: leg}}")):
+        assert codes(one, tmp_path) == ["duplicate-name"]
+
+
+@pytest.mark.parametrize(
+    ("instances", "code", "message"),
+    [
+        ("{legs: {module: leg, names: [a, a]}}", "duplicate-name", "'a' is named before"),
+        ("{legs: {module: leg, names: [a, legs]}}", "duplicate-name", "'legs' is all of these instances"),
+        ("{legs: {module: leg, names: [2nd]}}", "bad-name", "'2nd' is not a name"),
+        ("{legs: {module: leg, names: []}}", "wrong-size", "'names' has 0 names"),
+        ("{legs: {module: leg, count: 3, names: [a, b]}}", "wrong-size", "'names' has 2 names, 'count' says 3"),
+        ("{legs: {module: leg, names: [a, b]}, a: {module: leg}}", "duplicate-name", "'a' is called like the"),
+    ],
+)
+def test_instances_that_have_no_names(instances: str, code: str, message: str) -> None:
+    found = answer(f"{LEG}instances: {instances}")
+    assert found[0] == code
+    assert message in found[1]
+
+
 RECIPES = re.split(r"^## ", (Path(__file__).parents[1] / "docs" / "tables.md").read_text(encoding="utf-8"), flags=re.M)
 
 

@@ -15,7 +15,7 @@ from neurovis_spec.language.drawing import ModuleLayoutModel
 from neurovis_spec.language.grammar import GROUP, declaring, naming
 from neurovis_spec.language.located import FormulaField, IdentifierField, MeasuredField, TextField
 from neurovis_spec.language.model import Model, Named
-from neurovis_spec.language.sections import ConnectionsField, GroupsField, InputsField
+from neurovis_spec.language.sections import ConnectionsField, GroupsField, InputsField, ListedNamesField
 from neurovis_spec.language.values import ParametersField
 
 #: the sections of an included file
@@ -36,6 +36,9 @@ class InstanceModel(Model):
     module: Annotated[IdentifierField, naming("module")] = Field(description="The module that it is an instance of.")
     count: FormulaField | None = Field(
         None, description="How many instances; left with count 3 makes left1, left2, left3."
+    )
+    names: Annotated[ListedNamesField, declaring("instance")] | None = Field(
+        None, description="The names of the instances, one by one, or {file: …, column: …}."
     )
     set: Annotated[Named[Annotated[MeasuredField, GROUP]], naming("parameter")] = Field(
         default_factory=dict, description="{parameter of the module: value}; may use i (0-based) and n (count)."

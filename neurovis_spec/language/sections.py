@@ -242,7 +242,7 @@ def _position(node: Node, info: ValidationInfo) -> FileReference | TableColumn |
     return node if isinstance(node, AnyList) else refuse(info, node, wanted)
 
 
-def _neuron_names(node: Node, info: ValidationInfo) -> tuple[Located[str], ...] | TableColumn:
+def _listed_names(node: Node, info: ValidationInfo) -> tuple[Located[str], ...] | TableColumn:
     return as_names_column(node, info) if is_from_table(node) else as_texts(node, info)
 
 
@@ -254,8 +254,8 @@ def _box(node: Node, info: ValidationInfo) -> Located[str] | TableColumn:
     return as_words_column(node, info) if is_from_table(node) else as_text(node, info)
 
 
-NeuronNames = Annotated[
-    tuple[Located[str], ...] | TableColumn, Leaf(_neuron_names, Either((NAME, ListOf(NAME), NAMES)))
+ListedNamesField = Annotated[
+    tuple[Located[str], ...] | TableColumn, Leaf(_listed_names, Either((NAME, ListOf(NAME), NAMES)))
 ]
 LabelsField = Annotated[tuple[Located[str], ...] | TableColumn, Leaf(_labels, Either((TEXTS, WORDS)))]
 
@@ -288,7 +288,7 @@ class GroupModel(Model):
     first: Annotated[
         FormulaField | None, Needs(("count", "names"), "'first' needs 'count'", code="first-without-count")
     ] = Field(None, description="The number of the first neuron (default 1).")
-    names: Annotated[NeuronNames, declaring("neuron")] | None = Field(
+    names: Annotated[ListedNamesField, declaring("neuron")] | None = Field(
         None, description="The names of the neurons, one by one, or {file: …, column: …}."
     )
     activation: ActivationField | None = Field(

@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain
+from itertools import chain, count, takewhile
 from typing import Final
 
 from neurovis_spec.diagnostics import Span
@@ -226,6 +226,8 @@ class Index:
             if path[-3:-2] == ("instances",) and path[-1] == "module":
                 outer = str(path[1]) if len(path) == 5 and path[0] == "modules" else None
                 result[outer, str(path[-2])] = item.text
+                listed = (self.values.get((*path[:-1], "names", number)) for number in count())
+                result.update({(outer, one.text): item.text for one in takewhile(bool, listed) if one})
         return result
 
     def module_of(self, instance: str, outer: str | None = None) -> str | None:

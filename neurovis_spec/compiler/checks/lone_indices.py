@@ -44,7 +44,7 @@ def check_lone_indices(compiled: Compiled, findings: Findings) -> None:
 
 def _instances(section: Section, findings: Findings) -> None:
     for name, model in section.instances.items():
-        if model.count is None:
+        if model.count is None and model.names is None:
             for place, index in _occurrences(formulas_of(model, COUNTED), COUNTED):
                 hint = "'i' and 'n' count the instances of an entry; give it a 'count'"
                 _warn(place, index, f"'{name}' is one instance", hint, findings)
@@ -85,7 +85,8 @@ def _is_one(name: str, compiled: Compiled, place: int) -> bool:
         return name in compiled.census.directories[place].neurons
     scope = compiled.scopes[place]
     inside = known(scope.children.get(head, ()), ())
-    counted = head in scope.section.instances and scope.section.instances[head].count is not None
+    entry = scope.section.instances.get(head)
+    counted = entry is not None and (entry.count is not None or entry.names is not None)
     return len(inside) == 1 and not counted and _is_one(rest, compiled, inside[0])
 
 

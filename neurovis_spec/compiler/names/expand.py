@@ -16,6 +16,7 @@ from typing import Final
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits
 from neurovis_spec.compiler.names.input_bindings import InputBinding, bindings_of, check_sizes, shared_out
+from neurovis_spec.compiler.names.listed import listed_names
 from neurovis_spec.compiler.names.modules import Library, Module
 from neurovis_spec.compiler.names.references import Section, home_of, key_of, key_span
 from neurovis_spec.compiler.names.scope import Expansion, Scope
@@ -31,6 +32,7 @@ from neurovis_spec.language.located import NAME_RULE, in_unit, too_long
 from neurovis_spec.language.model import names_of, unread
 from neurovis_spec.language.modules import InstanceModel
 from neurovis_spec.language.places import formula_at
+from neurovis_spec.language.tables import TableColumn
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.likeness import suggest
 
@@ -141,8 +143,12 @@ class Expander:
         if not section.instances:
             return index
         by_name: dict[str, tuple[int, ...] | Unknown] = {}
+        of_tables: set[str] = set()  # their names are known from here alone, to whoever compares them
         for name, model in section.instances.items():
-            by_name.update(self._instances(name, model, scope, (*ancestors, index)))
+            made = self._instances(name, model, scope, (*ancestors, index))
+            by_name.update({one: places for one, places in made.items() if one not in of_tables})
+            if isinstance(model.names, TableColumn):
+                of_tables.update(made)
         children = names_of(section, "instances", by_name)
         inner = {  # inputs of a single instance are also seen from here, as INSTANCE.INPUT
             f"{name}.{key}": its_input
@@ -208,7 +214,7 @@ class Expander:
         a counted one."""
         module = self._module(model)
         count = None if model.count is None else scope.constants.integer(model.count, "'count'", 1)
-        if module is UNKNOWN or count is UNKNOWN or "count" in model.unknown:
+        if module is UNKNOWN or count is UNKNOWN or not model.unknown.isdisjoint(("count", "names")):
             for formula in model.set.values():
                 scope.constants.value(formula, dict.fromkeys(COUNTED, UNKNOWN))
             bindings_of(model, scope, self.findings)
@@ -218,18 +224,16 @@ class Expander:
             self.findings.error("too-deep", span, f"modules are nested at most {DEEPEST} deep")
             self.stopped = True
             raise _StoppedError
-        instance_names = [name] if count is None else [f"{name}{number}" for number in range(1, count + 1)]
-        if len(instance_names[-1]) > 64:
-            self.findings.error(
-                "bad-name", key_span(scope.section, "instances", name), too_long(instance_names[-1]), NAME_RULE
-            )
+        instance_names = self._instance_names(name, model, count, scope)
+        if instance_names is UNKNOWN:
             return {name: UNKNOWN}
+        single = count is None and model.names is None
         self.used.add(module.name)
         self._check_keys(model, module)
         bound = bindings_of(model, scope, self.findings)
         result: dict[str, tuple[int, ...]] = {}
         for position, instance_name in enumerate(instance_names):
-            number = 0 if count is None else position + 1
+            number = 0 if single else position + 1
             place = _Place(scope.called(instance_name), scope.called(name), number, position, len(instance_names))
             constants, settings = self._constants(model, module, scope, place)
             index = self._make_scope(
@@ -238,9 +242,28 @@ class Expander:
             result[instance_name] = (index,)
         for binding in bound.values():
             check_sizes(binding, instance_names, self.findings)
-        if count is not None:
+        if not single:
             result[name] = tuple(result[instance_name][0] for instance_name in instance_names)
         return result
+
+    def _instance_names(
+        self, name: str, model: InstanceModel, count: int | None, scope: Scope
+    ) -> tuple[str, ...] | Unknown:
+        """What the instances of an entry are called."""
+        span = key_span(scope.section, "instances", name)
+        if model.names is not None:
+            listed = listed_names(model.names, model.source, scope.files, "duplicate-name")
+            names = UNKNOWN if listed is UNKNOWN else listed.checked(count, self.findings)
+            if names is not UNKNOWN and name in names:
+                message = f"'{name}' is all of these instances, and one of them, too"
+                self.findings.error("duplicate-name", span, message, "rename one of them")
+                return UNKNOWN
+            return names
+        names = (name,) if count is None else tuple(f"{name}{number}" for number in range(1, count + 1))
+        if len(names[-1]) > 64:
+            self.findings.error("bad-name", span, too_long(names[-1]), NAME_RULE)
+            return UNKNOWN
+        return names
 
     def _module(self, model: InstanceModel) -> Module | Unknown:
         """The module that an instance names; UNKNOWN, and a finding, where there is none."""

@@ -137,7 +137,7 @@ class SizeEstimate:
             if module not in self._modules:
                 yield _Entered(module, 0, {})
                 continue
-            counts = _counted(model.count, constants, known, rows)
+            counts = size_of(model, constants, known, rows)
             instances += int(counts.sum())
             if instances > MOST_INSTANCES:
                 yield _Entered(module, int(counts.sum()), {})
@@ -165,8 +165,10 @@ def _wait(entered: Iterable[_Entered], waiting: Mapping[str, _Made]) -> int:
     return instances
 
 
-def size_of(group: GroupModel, constants: Constants, known: Mapping[str, FloatArray], rows: int) -> FloatArray:
-    """How many neurons a group has, in each row."""
+def size_of(
+    group: GroupModel | InstanceModel, constants: Constants, known: Mapping[str, FloatArray], rows: int
+) -> FloatArray:
+    """How many neurons a group has, or instances an entry makes, in each row."""
     if group.count is None:
         names = () if isinstance(group.names, TableColumn) else group.names or ()  # no file is opened here
         return np.full(rows, float(len(names) or 1))

@@ -17,7 +17,8 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.events.settable import BIAS, Part
 from neurovis_spec.compiler.flows import ports_read_by
-from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
+from neurovis_spec.compiler.limits import Limits, amount, plural
+from neurovis_spec.compiler.names.listed import ListedNames, listed_names
 from neurovis_spec.compiler.names.references import key_span, known_inputs
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.names.state_references import no_port, no_state
@@ -46,8 +47,6 @@ from neurovis_spec.language.located import (
     NAME_RULE,
     Formula,
     Located,
-    bad_name,
-    name_hint,
     too_long,
     value_or,
 )
@@ -331,17 +330,17 @@ class Builder:
         count = None if model.count is None else self.constants.integer(model.count, "'count'", 1)
         if count is UNKNOWN:
             return UNKNOWN, None
-        written = self._names_in_table(model.names) if isinstance(model.names, TableColumn) else model.names
+        written = self._listed(model)
         if written is UNKNOWN:
             return UNKNOWN, None
-        total = start + (count or len(written or ()) or 1)
+        total = start + (count or (0 if written is None else len(written.names)) or 1)
         if total > self.limits.neurons:
             span = key_span(self.scope.section, "neurons", name) if model.count is None else model.count.span
             message = f"this makes {amount(total)} neurons; the limit is {self.limits.neurons:,}"
             findings.error("too-many", span, message, "raise it with --limit")
             return UNKNOWN, None
         if written is not None:
-            return self._written_names(written, model, count), None
+            return written.checked(count, self.constants.findings), None
         if count is None:
             return (name,), None
         first = 1 if model.first is None else self.constants.integer(model.first, "'first'", 0)
@@ -353,49 +352,11 @@ class Builder:
             return UNKNOWN, None
         return names, first
 
-    def _names_in_table(self, wanted: TableColumn) -> tuple[Located[str], ...] | Unknown:
-        """The names in a column of a table, each of which is a name, and none twice."""
-        found = TableReader(self.scope.files, UNKNOWN, "").all_texts(wanted)
-        if found is UNKNOWN:
-            return UNKNOWN
-        (column,), findings, rows = wanted.columns, self.constants.findings, dict[str, int]()
-        before = findings.errors
-        for name, row in found:
-            if not IDENTIFIER.fullmatch(name):
-                message = f"row {row} of the table: {bad_name(name)}"
-                findings.error("bad-name", column.span, message, name_hint(name), key=row)
-            elif rows.setdefault(name, row) != row:
-                message = f"row {row} of the table: '{name}' is named before (row {rows[name]})"
-                findings.error("duplicate-neuron", column.span, message, key=row)
-            if findings.errors - before >= PATIENCE:
-                break
-        return UNKNOWN if findings.errors > before else tuple(Located(name, column.node) for name in rows)
-
-    def _written_names(
-        self, written: tuple[Located[str], ...], model: GroupModel, count: int | None
-    ) -> tuple[str, ...] | Unknown:
-        """The names under ``names``; UNKNOWN where it is not known how many neurons these are."""
-        findings = self.constants.findings
-        seen: dict[str, Located[str]] = {}
-        before = findings.errors
-        for item in written:
-            if not IDENTIFIER.fullmatch(item.value):
-                findings.error("bad-name", item.span, bad_name(item.value), name_hint(item.value))
-            elif item.value in seen:
-                line = seen[item.value].span.line
-                findings.error("duplicate-neuron", item.span, f"'{item.value}' is named before (line {line})")
-            seen[item.value] = item
-            if findings.errors - before >= PATIENCE:
-                break
-        if findings.errors > before:  # how many they are is known
-            return tuple(item.value for item in written)
-        if not seen or (count is not None and count != len(seen)):
-            wanted = "at least one is wanted" if count is None else f"'count' says {count}"
-            node = model.source.get("names")
-            span = written[0].span if written else model.source.span if node is None else node.span
-            findings.error("wrong-size", span, f"'names' has {plural(len(seen), 'name')}, {wanted}")
-            return UNKNOWN
-        return tuple(seen)
+    def _listed(self, model: GroupModel) -> ListedNames | Unknown | None:
+        """The names under ``names``; None where there are none."""
+        if model.names is None:
+            return None
+        return listed_names(model.names, model.source, self.scope.files, "duplicate-neuron")
 
     def _kind(self, name: str, model: GroupModel, n: int | Unknown, table: TableReader) -> NeuronType:
         """The activation and the model of the neurons; ``identity`` and ``static`` where these are invalid."""

@@ -27,8 +27,9 @@ from neurovis_spec.compiler.network import Group, Neurons, Route
 from neurovis_spec.compiler.neurons.groups import Builder, Built, Kinds, unread_neurons
 from neurovis_spec.compiler.neurons.positions import depend_on_positions
 from neurovis_spec.compiler.program import Definition
-from neurovis_spec.language.located import IDENTIFIER
+from neurovis_spec.language.located import IDENTIFIER, Located
 from neurovis_spec.language.model import names_of
+from neurovis_spec.language.tables import TableColumn
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
 Number = TypeVar("Number", np.float64, np.int64)
@@ -300,7 +301,8 @@ def _check_instances(scope: Scope, owners: Mapping[str, str]) -> None:
     children = scope.children.known()
     for name, model in section.instances.items():
         count = 0 if model.count is None else len(children.get(name, ()))
-        for called in (name, *(f"{name}{number}" for number in range(1, count + 1))):
+        numbered = (f"{name}{number}" for number in range(1, count + 1))
+        for called in (name, *(numbered if model.names is None else _listed(name, model.names, children))):
             other = taken.setdefault(called, name)
             what = None
             if other != name:
@@ -315,6 +317,16 @@ def _check_instances(scope: Scope, owners: Mapping[str, str]) -> None:
                 hint = "groups, inputs and instances share their names"
                 findings.error("duplicate-name", key_span(section, "instances", name), message, hint)
                 break
+
+
+def _listed(
+    name: str, written: tuple[Located[str], ...] | TableColumn, children: Mapping[str, tuple[int, ...]]
+) -> tuple[str, ...]:
+    """The names that the instances of an entry have by themselves."""
+    if not isinstance(written, TableColumn):
+        return tuple(one.value for one in written)
+    own = set(children.get(name, ()))
+    return tuple(other for other, places in children.items() if other != name and own.issuperset(places))
 
 
 def _join(all_groups: list[_ScopeGroups]) -> Census:
