@@ -382,6 +382,9 @@ def test_instances_have_names(tmp_path: Path) -> None:
         ("front", "legs", 1),
         ("hind", "legs", 2),
     ]
+    run = listed.run(2)
+    assert run["legs.K"].tolist() == [[0, 0], [4, 9]]
+    assert run["hind.A"].tolist() == [3, 3]
     table = "{file: legs.csv, column: leg, where: {side: left}}"
     text = LEG + f"instances: {{legs: {{module: leg, names: {table}, set: {{g: i + 2}}}}}}\n" + rest
     assert compiled(text, tmp_path).hash == listed.hash

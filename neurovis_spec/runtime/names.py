@@ -166,8 +166,25 @@ def names_of(network: Network) -> Names:
     """Who is called what in a network."""
     groups = {g.name: (tuple(g.indices), False) for g in network.neurons.groups if g.name not in network.neuron_index}
     outputs = {o.name: (tuple(o.neurons.tolist()), o.scalar) for o in network.outputs if not o.states}
-    counted = {one.declared: number for one in network.instances if (number := one.number)}
-    return Names(network.neuron_index, outputs | groups, counted)
+    numbered = [one for one in network.instances if one.number]
+    named = {one.path: one.declared for one in numbered if one.path != f"{one.declared}{one.number}"}
+    counted = {one.declared: one.number for one in numbered if one.path not in named}
+    together = {name: (neurons, False) for name, neurons in _together(network, named).items()} if named else {}
+    return Names(network.neuron_index, outputs | groups | together, counted)
+
+
+def _together(network: Network, named: Mapping[str, str]) -> dict[str, tuple[int, ...]]:
+    """The neurons and groups of instances with names of their own, by what all of these are called: ``legs.K``."""
+    inside = [(group.name, group.indices) for group in network.neurons.groups]
+    inside += [(name, range(index, index + 1)) for name, index in network.neuron_index.items()]
+    result: dict[str, dict[int, None]] = {}
+    for name, neurons in inside:
+        steps = name.split(".")
+        for end in range(1, len(steps)):
+            declared = named.get(".".join(steps[:end]))
+            if declared is not None:
+                result.setdefault(".".join((declared, *steps[end:])), {}).update(dict.fromkeys(neurons))
+    return {name: tuple(neurons) for name, neurons in result.items()}
 
 
 def _joined(found: Iterable[Found | None]) -> Found | None:
