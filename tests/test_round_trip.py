@@ -12,9 +12,24 @@ from laws import examples
 from random_specs import Spec, specs
 
 import neurovis_spec as nv
+from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout.file import parse
 from neurovis_spec.scene.probe import probe_steps
+
+#: Steps beyond which an example is cut short here: its pictures over time need no more.
+ENOUGH = 5_000
+
+
+def short(path: Path) -> CompiledNetwork:
+    """An example, of which a long run is made shorter."""
+    network = shipped(path)
+    if network.network.steps <= ENOUGH:
+        return network
+    text = path.read_text(encoding="utf-8")
+    written = f"steps: {network.network.steps}"
+    assert written in text
+    return nv.compile_text(text.replace(written, f"steps: {ENOUGH // 2}"), folder=path.parent)
 
 
 @settings(examples(6), suppress_health_check=[HealthCheck.too_slow])
@@ -46,7 +61,7 @@ def test_a_recording_reads_back_exactly(path: Path, tmp_path: Path) -> None:
 def test_a_step_looks_the_same_run_or_recorded(path: Path, tmp_path: Path) -> None:
     """The gains, and what views over time show, come from the recording, else from the default run: here these are the
     same."""
-    network = shipped(path)
+    network = short(path)
     shown = network.network.steps if len(network.network.render.figure) > 1 else 31
     network.run(max(shown, probe_steps(network.network))).save(tmp_path / "run.npz")
     network.render(tmp_path / "recorded.svg", step=30, recording=nv.load(tmp_path / "run.npz"))
@@ -56,7 +71,7 @@ def test_a_step_looks_the_same_run_or_recorded(path: Path, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_every_example_becomes_every_kind_of_picture(path: Path, tmp_path: Path) -> None:
-    network = shipped(path)
+    network = short(path)
     for name in ("still.svg", "still.png"):
         network.render(tmp_path / name, step=5)
     network.animate(tmp_path / "film.svg", steps=8)
