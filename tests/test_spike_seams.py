@@ -334,3 +334,16 @@ connections:
             np.testing.assert_array_equal(rest.activity, whole.activity[cut:])
         with pytest.warns(CodedWarning, match=r"lacks states (with a derivative|of neurons that fire), as of [AB]1"):
             network.run(3, backend=backend, start=network.run(5, backend=backend))
+
+
+def test_all_states_tell_who_is_armed_and_how_long_who_rests() -> None:
+    """As the manual has it: 1 more than the steps for which a neuron cannot fire yet, 0 behind these."""
+    run = nv.compile_text(SPEC).run(backend="reference", states="all")
+    fired, rests = run["K1.spike"].ravel(), run["K1.rests for"].ravel()
+    assert fired.sum() > 3
+    expected = np.zeros(len(fired))
+    for step in np.flatnonzero(fired).tolist():
+        behind = expected[step : step + 3]
+        behind[:] = [3, 2, 1][: len(behind)]
+    assert rests.tolist() == expected.tolist()
+    assert {"K1.is armed", "K1.rests for"} <= set(run.state_names)
