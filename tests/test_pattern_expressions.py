@@ -194,8 +194,15 @@ def test_of_a_symmetric_entry_where_may_hold_either_way() -> None:
     assert both == [pair for j in range(1, 6) for pair in ((0, j), (j, 0))]
 
 
+def test_no_more_pairs_are_looked_at_than_may_be() -> None:
+    spec = "neurovis: 1\nname: x\nneurons: {A: {count: 300000}}\nconnections: {A -> A: "
+    for entry in ("{where: i == j}", "{pattern: {random: {probability: 0*i}}}"):
+        with pytest.raises(nv.SpecError, match="looks at 90,000,000,000 pairs; the limit is 1,000,000,000"):
+            nv.compile_text(f"{spec}{entry}}}")
+
+
 def test_where_makes_no_more_than_there_is_room_for() -> None:
-    spec = "neurovis: 1\nname: x\nneurons: {A: {count: 3000}}\nconnections: {A -> A: {where: i + j < 3}}"
+    spec = "neurovis: 1\nname: x\nneurons: {A: {count: 20}}\nconnections: {A -> A: {where: i + j < 3}}"
     assert len(nv.compile_text(spec, limit=10).network.connections) == 4
-    with pytest.raises(nv.SpecError, match="the limit is 3"):
-        nv.compile_text(spec, limit=3)
+    with pytest.raises(nv.SpecError, match="4 connections; the limit is 3"):
+        nv.compile_text(spec.replace("20", "15"), limit=3)

@@ -14,6 +14,8 @@ PATIENCE = 20
 MOST_INSTANCES = 100_000
 #: How deep instances may be nested.
 DEEPEST = 64
+#: How many pairs are looked at, at most, by a formula that says which there are, for each connection that there may be.
+PAIRS_A_CONNECTION = 100
 #: The longest delay, in steps.
 LONGEST_DELAY = 1_000_000
 #: The most signals under way at once: the delays of all connections, in steps, added up.

@@ -34,7 +34,7 @@ from neurovis_spec.compiler.connections.ties import Entries, Tied, tied_to
 from neurovis_spec.compiler.connections.twins import both_ways, doubled, in_turn, one_of_each
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Part
-from neurovis_spec.compiler.limits import Limits, amount
+from neurovis_spec.compiler.limits import PAIRS_A_CONNECTION, Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
@@ -207,7 +207,8 @@ class EntryBuilder:
     @property
     def formulas(self) -> PairFormulas:
         """What evaluates those of pairs."""
-        return PairFormulas(self.sources, self.targets, self.context.census, self.constants)
+        most = PAIRS_A_CONNECTION * self.context.limits.connections
+        return PairFormulas(self.sources, self.targets, self.context.census, self.constants, most)
 
     @cached_property
     def route(self) -> Route | Unknown:

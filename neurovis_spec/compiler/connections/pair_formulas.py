@@ -16,6 +16,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.connections.ends import counted
 from neurovis_spec.compiler.events.settable import Dependent, Distance, Part, apart
+from neurovis_spec.compiler.limits import amount
 from neurovis_spec.compiler.neurons.groups import is_written
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import MODEL
@@ -72,6 +73,8 @@ class PairFormulas:
     targets: Indices | Unknown
     census: Census
     constants: Constants
+    #: how many pairs may be looked at, for those that there are
+    most: int
 
     def values(self, formula: Formula, role: Role, at: At | Unknown, stream: Stream) -> FloatArray | Unknown:
         """What a formula is at each pair, of the names that its ``role`` sees."""
@@ -107,6 +110,12 @@ class PairFormulas:
         i, j = counted(len(self.sources))[:, None], counted(len(self.targets))[None]
         tree = self._tree(formula, role, At(i, j))
         if tree is UNKNOWN:
+            return UNKNOWN
+        looked_at = len(self.sources) * len(self.targets)
+        if looked_at > self.most:
+            message = f"this looks at {amount(looked_at)} pairs; the limit is {self.most:,}"
+            hint = "name fewer neurons, or raise it with --limit, a hundred pairs a connection"
+            self.constants.findings.error("too-many", formula.span, message, hint)
             return UNKNOWN
         used = names(tree)
         self.go_by(used)

@@ -180,7 +180,8 @@ RECIPES: Final[Mapping[str, _Recipe]] = {
 _ELSEWHERE: Final[Mapping[str, str]] = {
     **dict.fromkeys(("full", "fully_connected", "dense", "complete"), "all_to_all"),
     **dict.fromkeys(("identity", "diagonal", "pairwise"), "one_to_one"),
-    **dict.fromkeys(("bernoulli", "sparse", "erdos_renyi"), "random"),
+    **dict.fromkeys(("bernoulli", "pairwise_bernoulli", "sparse", "erdos_renyi"), "random"),
+    **dict.fromkeys(("fixed_total_number", "fixed_number"), "total"),
     "watts_strogatz": "small_world",
 }
 
