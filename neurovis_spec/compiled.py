@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from neurovis_spec.runtime.columns import Keep
     from neurovis_spec.runtime.recording import Recording
     from neurovis_spec.runtime.simulation import Simulation
+    from neurovis_spec.runtime.state import State
     from neurovis_spec.runtime.step_check import StepCheck
     from neurovis_spec.runtime.until import Until
     from neurovis_spec.scene.look import Look
@@ -333,18 +334,44 @@ class CompiledNetwork(Compilation):
     def export(
         self, folder: str | Path, to: str = "c", *, start: Recording | None = None, real: str = "double"
     ) -> tuple[list[Path], list[Path]]:
-        """Write the network as source code into a folder: ``c`` is C99 that is C++17, too, with numbers of type
-        ``real``, double or float. ``start`` is a recording whose last weights and activities it begins with. Gives the
-        files written, and those that were there and stay. Raises ExportError, RecordingError, OSError, ValueError."""
+        """Write the network into a folder: ``c`` is source code, C99 that is C++17, too, with numbers of type ``real``,
+        double or float; ``csv`` are tables of its neurons and edges. ``start`` is a recording whose last weights (and,
+        in C, activities) it begins with. Gives the files written, and those that were there and stay. Raises
+        ExportError, RecordingError, OSError, ValueError."""
         from neurovis_spec.language.expressions.functions import PLAIN
         from neurovis_spec.runtime.c_package import files, write
         from neurovis_spec.runtime.resume import resumed_state
 
-        if to != "c" or real not in ("double", "float"):
-            raise ValueError(f"a network is exported to c, of double or float, not to {to} of {real}")
+        if to not in ("c", "csv") or real not in ("double", "float"):
+            raise ValueError(f"a network is exported to c, of double or float, or to csv, not to {to} of {real}")
         check(start=start)
         state = None if start is None else resumed_state(self.network, start, PLAIN, own_signals=True)
+        if to == "csv":
+            return self._export_tables(arguments.path("folder", folder), state), []
         return write(arguments.path("folder", folder), files(self.network, state, real))
+
+    def _export_tables(self, folder: Path, state: State | None) -> list[Path]:
+        """Write tables of neurons and edges, none of them over a file that the spec reads. Raises ExportError,
+        OSError."""
+        from neurovis_spec.language.tables import EdgeFile
+        from neurovis_spec.runtime.c_settable import ExportError
+        from neurovis_spec.runtime.csv_tables import EdgeNames, csv_tables
+        from neurovis_spec.runtime.files import replacing
+
+        bodies = [body for _, body in self.spec.connections]
+        names = EdgeNames.of(body.edges for body in bodies if isinstance(body.edges, EdgeFile))
+        weights = self.network.connections.weights.whole() if state is None else state.weights
+        texts = csv_tables(self.network, weights, names)
+        paths = {folder / name: text for name, text in texts.items()}
+        read = {path.resolve() for path in self.files}
+        for path in paths:
+            if path.resolve() in read:
+                raise ExportError(f"{path} is a file that the spec reads, which would be lost: name another folder")
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, text in paths.items():
+            with replacing(path) as file:
+                file.write(text.encode())
+        return [*paths]
 
     def choose_engine(self) -> tuple[str, str]:
         """The layout engine, and why."""

@@ -411,6 +411,46 @@ def test_instances_that_have_no_names(instances: str, code: str, message: str) -
     assert message in found[1]
 
 
+def test_what_is_exported_is_read_back(tmp_path: Path) -> None:
+    """In the columns that the spec names, with learned weights; and not over what it reads."""
+    (tmp_path / "worm.tsv").write_text(WORM)
+    columns = "columns: {from: Source, to: Target, weight: N, delay: {column: delay_ms, unit: ms}}"
+    neurons = (
+        "neurons: {C: {names: [AVAL, AVAR, AVBL], bias: [1, 2, 3], position: [[0, 0], [1, 0], [2, 0]], box: head}}"
+    )
+    body = f"{{edges: {{file: worm.tsv, {columns}, where: {{Type: chemical}}}}, plasticity: hebbian}}"
+    text = f"time: {{dt: 0.5 ms}}\n{neurons}\nconnections: {{C -> C: {body}}}"
+    network = compiled(text, tmp_path)
+    written, kept = network.export(tmp_path / "out", "csv", start=network.run(10))
+    learned = network.run(11).weights[-1].tolist()
+    assert ([path.name for path in written], kept) == (["neurons.csv", "edges.csv"], [])
+    assert (tmp_path / "out" / "edges.csv").read_text().splitlines()[0] == "Source,Target,N,delay_ms,entry"
+    table = "file: out/neurons.csv"
+    again = (
+        f"time: {{dt: 0.5 ms}}\nneurons: {{C: {{names: {{{table}, column: name}}, bias: {{{table}, column: bias}}, "
+        f"position: {{{table}, columns: [x, y]}}, box: {{{table}, column: box}}}}}}\n"
+        f"connections: {{C -> C: {{edges: {{file: out/edges.csv, {columns}}}, plasticity: hebbian}}}}"
+    )
+    back = network_of(again, tmp_path)
+    assert wires(back) == [(*one[:2], w, one[3]) for one, w in zip(wires(network.network), learned, strict=True)]
+    assert back.neurons.bias.tolist() == [1, 2, 3]
+    assert back.neurons.position.tolist() == [[0, 0], [1, 0], [2, 0]]
+    assert back.layout.boxes == (("head", (0, 1, 2)),)
+    with pytest.raises(ValueError, match="a file that the spec reads"):
+        compiled(again, tmp_path).export(tmp_path / "out", "csv")
+
+
+def test_delays_that_are_continuous_are_exported_as_such(tmp_path: Path) -> None:
+    text = (
+        "time: {dt: 1 ms}\nmodels: {m: {state: {v: {initial: 1, derivative: drive - v}}, activity: v}}\n"
+        "neurons: {A: {model: m}, B: {model: m}}\nconnections: {A -> B: {weight: 2, delay: 1.5 ms}, B -> A: 1}"
+    )
+    network = compiled(text)
+    network.export(tmp_path, "csv")
+    lines = (tmp_path / "edges.csv").read_text().splitlines()
+    assert lines == ["from,to,weight,delay,delay_seconds,entry", "A,B,2.0,,0.0015,A -> B", "B,A,1.0,0,,B -> A"]
+
+
 RECIPES = re.split(r"^## ", (Path(__file__).parents[1] / "docs" / "tables.md").read_text(encoding="utf-8"), flags=re.M)
 
 
