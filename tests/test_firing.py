@@ -202,6 +202,17 @@ neurons: {K: {count: 2, model: cell, bias: [1.3, 1.6]}, P: {count: 2, model: sho
 """
 
 
+@pytest.mark.parametrize("states", ["", "all"])
+def test_a_lesioned_neuron_has_no_rate(states: str) -> None:
+    """Its states go on, the one that is its spike among them, and it fires for nobody."""
+    network = nv.compile_text(f"{RATED}events: [{{at: 100, lesion: P1}}]\n")
+    run = network.run(backend="reference", states=[states] if states else ())
+    rate = network.measure("rate(P, last=90)", run)
+    assert rate[99] > 0
+    assert rate[199] == 0
+    assert network.run(backend="reference", until="k > 120 and rate(P, last=20) > 0").step[-1] == 199
+
+
 @pytest.mark.parametrize("backend", ["reference", "numpy"])
 def test_a_measure_of_the_rate(backend: str) -> None:
     """Of groups, of neurons whose activity is something else, step by step, in blocks, and of a recording."""

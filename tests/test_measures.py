@@ -17,6 +17,7 @@ import neurovis_spec as nv
 from neurovis_spec.language.expressions.measures import SUMMARIES, parse_measure
 from neurovis_spec.runtime.measures import Meter, measure_of
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.runtime.state import initial_state
 from neurovis_spec.runtime.windows import _Last, running
 
 Array = npt.NDArray[np.float64]
@@ -121,10 +122,10 @@ def test_a_measure_of_a_recording(text: str, wanted: Callable[[Array, Recording]
     expected[: measure.longest - 1] = np.nan
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     meter = Meter(measure)
-    parameters = network.network.settable.parameters.copy()
+    conditions = initial_state(network.network).conditions
     for k in range(40):
-        parameters[network.network.settable.index["gain"]] = 0.5 if k < 20 else 0.75
-        value = meter.step(recording.activity[k], parameters, np.zeros(0))
+        conditions.parameters[network.network.settable.index["gain"]] = 0.5 if k < 20 else 0.75
+        value = meter.step(recording.activity[k], conditions, np.zeros(0))
         assert value == found[k] or (math.isnan(value) and math.isnan(found[k])) or "mean(gain" in text
 
 
@@ -245,15 +246,16 @@ def test_a_long_expression_of_windows_is_parsed_in_no_time() -> None:
 )
 def test_of_many_steps_at_once_the_bits_are_those_of_each(text: str, together: bool) -> None:
     """Also where 0 meets −0, which are equal and of which NumPy's ``min`` and ``max`` take either."""
-    measure = measure_of(text, nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {}, B: {}}").network, "<test>")
+    network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {}, B: {}}").network
+    measure, conditions = measure_of(text, network, "<test>"), initial_state(network).conditions
     assert measure.together == together
     values = [0.0, -0.0, 1.0, -0.0, 0.0, 0.0, -0.0, -1.0, math.inf, -0.0, math.nan, 0.0]
     rows = np.array([(a, b) for a in values for b in values])
-    one, many, none = Meter(measure), Meter(measure), np.zeros(0)
+    one, many = Meter(measure), Meter(measure)
     with np.errstate(all="ignore"):
-        each = np.array([one.step(row, none, none) for row in rows])
+        each = np.array([one.step(row, conditions, np.zeros(0)) for row in rows])
         if together:
-            made = many.rows(rows, none, np.zeros((len(rows), 0)))
+            made = many.rows(rows, conditions, np.zeros((len(rows), 0)))
             np.testing.assert_array_equal(made, each)
             np.testing.assert_array_equal(np.signbit(made[made == made]), np.signbit(each[each == each]))
 
@@ -298,8 +300,8 @@ def test_measures_are_over_the_neurons_of_groups_and_over_steps(text: str) -> No
     np.testing.assert_allclose(found[longest - 1 :], expected[longest - 1 :], rtol=1e-14)
     meter, probe = Meter(measure_of(text, network.network, "<measure>")), recording["K.v"]
     states = probe if "K.v" in text else probe[:, :0]
-    parameters = network.network.settable.parameters
-    stepped = [meter.step(recording.activity[t], parameters, states[t]) for t in range(len(recording))]
+    conditions = initial_state(network.network).conditions
+    stepped = [meter.step(recording.activity[t], conditions, states[t]) for t in range(len(recording))]
     np.testing.assert_array_equal(stepped, found)
 
 

@@ -35,7 +35,7 @@ from neurovis_spec.runtime.errors import RecordingError, UnknownNameError
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_states
-from neurovis_spec.runtime.state import constants, initial_state
+from neurovis_spec.runtime.state import Conditions, constants, initial_state
 from neurovis_spec.runtime.windows import running
 
 #: Names that mean the same in every measure.
@@ -67,9 +67,9 @@ class Measure:
     states: Mapping[str, int]
     #: for each reference to several states that stands in a window or a count their columns
     state_groups: Mapping[str, IntArray]
-    #: for each reference whose rate is asked for the neurons that it names whose activity is a spike, and the states
-    #: that are the spikes of the others
-    spikes: Mapping[str, tuple[IntArray, tuple[str, ...]]]
+    #: for each reference whose rate is asked for the neurons that it names whose activity is a spike, the others, and
+    #: the states that are the spikes of these
+    spikes: Mapping[str, tuple[IntArray, IntArray, tuple[str, ...]]]
     probe: Probe
     #: seconds a step
     dt: float
@@ -145,7 +145,7 @@ def resolved(formula: Formula, network: Network, label: str) -> Measure:
     groups: dict[str, IntArray] = {}
     slots: dict[str, int] = {}
     states: dict[str, StateOf] = {}
-    spikes: dict[str, tuple[IntArray, tuple[str, ...]]] = {}
+    spikes: dict[str, tuple[IntArray, IntArray, tuple[str, ...]]] = {}
     several_states: dict[str, tuple[str, ...]] = {}
     places = {PLACE(number) for number in range(len(formula.windows))}
     places |= {COUNTED(number) for number in range(len(formula.counts))}
@@ -254,7 +254,7 @@ def _resolve_spikes(
     span: Span,
     network: Network,
     directory: Names,
-    spikes: dict[str, tuple[IntArray, tuple[str, ...]]],
+    spikes: dict[str, tuple[IntArray, IntArray, tuple[str, ...]]],
     states: dict[str, StateOf],
     findings: Findings,
 ) -> None:
@@ -274,7 +274,7 @@ def _resolve_spikes(
     own = [StateOf.of("neuron", SPIKE, others[at : at + 1]) for at in range(len(others))]
     names = network.state_names(own)
     states |= dict(zip(names, own, strict=True))
-    spikes[name] = np.intersect1d(neurons, spiking.by_activity), tuple(names)
+    spikes[name] = np.intersect1d(neurons, spiking.by_activity), others, tuple(names)
 
 
 def _resolve(
@@ -338,18 +338,18 @@ class Meter:
         other._running, other.values = copy.deepcopy(self._running), list(self.values)
         return other
 
-    def step(self, activity: FloatArray, parameters: FloatArray, states: FloatArray) -> float:
-        """After one more step: a[t] of all neurons, the parameters of the step (one a slot), the states of the probe.
+    def step(self, activity: FloatArray, conditions: Conditions, states: FloatArray) -> float:
+        """After one more step: a[t] of all neurons, the conditions of the step, the states of the probe.
         NaN before the measure has a value."""
         known = dict(self._constants)
         for name, index in self.measure.neurons.items():
             known[name] = float(activity[index])
         for name, slot in self.measure.slots.items():
-            known[name] = float(parameters[slot])
+            known[name] = float(conditions.parameters[slot])
         for name, column in self.measure.states.items():
             known[name] = float(states[column])
         for name in self.measure.spikes:
-            known[name] = float(self._rate(name, activity[None], states[None])[0])
+            known[name] = float(self._rate(name, activity[None], conditions, states[None])[0])
         k = self.first + self.made
         known["k"] = float(k)
         known["t"] = k * self.measure.dt
@@ -365,11 +365,13 @@ class Meter:
             self.values[number] = known[PLACE(number)] = value
         return math.nan if self.made < self.measure.longest else evaluate(self.measure.formula.tree, known)
 
-    def _rate(self, name: str, activity: FloatArray, states: FloatArray) -> FloatArray:
-        """How many of the neurons of a reference fire at each of some steps, a neuron and a second, (steps,)."""
-        neurons, of_states = self.measure.spikes[name]
-        columns = [self.measure.states[state] for state in of_states]
-        fired = np.count_nonzero(activity[:, neurons], axis=1) + np.count_nonzero(states[:, columns], axis=1)
+    def _rate(self, name: str, activity: FloatArray, conditions: Conditions, states: FloatArray) -> FloatArray:
+        """How many of the neurons of a reference fire at each of some steps, a neuron and a second, (steps,). The
+        states of a lesioned neuron go on, and it fires for nobody."""
+        neurons, others, of_states = self.measure.spikes[name]
+        columns = np.array([self.measure.states[state] for state in of_states], dtype=np.int64)
+        heard = columns[~conditions.lesioned_neurons[others]]
+        fired = np.count_nonzero(activity[:, neurons], axis=1) + np.count_nonzero(states[:, heard], axis=1)
         result: FloatArray = fired / ((len(neurons) + len(columns)) * self.measure.dt)
         return result
 
@@ -402,14 +404,14 @@ class Meter:
         with np.errstate(all="ignore"):
             return _ACROSS[how](values)
 
-    def rows(self, activity: FloatArray, parameters: FloatArray, states: FloatArray) -> FloatArray:
-        """After each of some more steps, all with the same parameters: a row of ``activity`` and ``states`` a step."""
+    def rows(self, activity: FloatArray, conditions: Conditions, states: FloatArray) -> FloatArray:
+        """After each of some more steps, all under the same conditions: a row of ``activity`` and ``states`` a step."""
         count = len(activity)
         known: dict[str, float | FloatArray] = dict(self._constants)
         known |= {name: activity[:, index] for name, index in self.measure.neurons.items()}
-        known |= {name: float(parameters[slot]) for name, slot in self.measure.slots.items()}
+        known |= {name: float(conditions.parameters[slot]) for name, slot in self.measure.slots.items()}
         known |= {name: states[:, column] for name, column in self.measure.states.items()}
-        known |= {name: self._rate(name, activity, states) for name in self.measure.spikes}
+        known |= {name: self._rate(name, activity, conditions, states) for name in self.measure.spikes}
         begin = self.first + self.made
         k = np.arange(begin, begin + count).astype(np.float64)
         known |= {"k": k, "t": k * self.measure.dt}
@@ -458,7 +460,7 @@ def over(text: str, network: Network, recording: Recording) -> FloatArray:
             with np.errstate(all="ignore"):
                 controls.apply(state, changes.popleft())
         rows = slice(begin - first, end - first)
-        parts.append(meter.rows(recording.activity[rows], state.conditions.parameters, states[rows]))
+        parts.append(meter.rows(recording.activity[rows], state.conditions, states[rows]))
     return np.concatenate(parts)
 
 

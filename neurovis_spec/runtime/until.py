@@ -82,15 +82,15 @@ class Watched:
     def made(self, activity: FloatArray) -> int:
         """Evaluate the measure after each of these steps, of which these are the activities (steps, n): how many of
         them the run has, all unless it ends among them. Only where the measure is ``together``."""
-        parameters = self._state.conditions.parameters
+        conditions = self._state.conditions
         meter_before = self._meter.copy()
-        values = self._meter.rows(activity, parameters, np.zeros((len(activity), 0)))
+        values = self._meter.rows(activity, conditions, np.zeros((len(activity), 0)))
         true = np.flatnonzero((values == values) & (values != 0))  # NaN is not true
         if not len(true):
             return len(activity)
         self._met, count = True, int(true[0]) + 1
         self._meter = meter_before  # without the steps behind the end
-        self._meter.rows(activity[:count], parameters, np.zeros((count, 0)))
+        self._meter.rows(activity[:count], conditions, np.zeros((count, 0)))
         return count
 
     def asked(self) -> bool:
@@ -100,7 +100,7 @@ class Watched:
     def due(self) -> bool:
         """Whether rows are to be handed on now, asked after each step."""
         state, probe = self._state, self._until.measure.probe
-        value = self._meter.step(state.activity, state.conditions.parameters, probe.now(state))
+        value = self._meter.step(state.activity, state.conditions, probe.now(state))
         self._met = value == value and value != 0
         return self._rows.due() or self._met
 

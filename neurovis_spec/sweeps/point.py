@@ -139,10 +139,10 @@ class _Metered:
 
     def end(self, count: int) -> None:
         if count:
-            parameters = self._state.conditions.parameters
+            conditions = self._state.conditions
             activity, states = self._rows.activity[:count], self._rows.states[:count]
             self.last = [
-                float(meter.rows(activity, parameters, states[:, places])[-1])
+                float(meter.rows(activity, conditions, states[:, places])[-1])
                 for meter, places in zip(self._meters, self._places, strict=True)
             ]
 
