@@ -11,11 +11,20 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.live.history import Bins, Members, Recorded, Ring
-from neurovis_spec.live.protocol import TRACE, LookAt, ProtocolError, command_of, trace_message
+from neurovis_spec.live.protocol import (
+    RASTER,
+    TRACE,
+    LookAt,
+    ProtocolError,
+    Trace,
+    command_of,
+    raster_message,
+    trace_message,
+)
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.turns import Hold, Set
-from neurovis_spec.live.view import view_of
+from neurovis_spec.live.view import RASTER_ROWS, view_of
 
 SPEC = """neurovis: 1
 name: live
@@ -165,6 +174,73 @@ def test_states_outputs_and_signals_have_traces_by_their_names(recorded: bool) -
     for item in ("c2.signal", "n3.v", "c0.h", "c0.v", "n0.signal", "c9.g"):
         assert view.members(item) is None
         assert view.values(source.seen(), [item], source.quantities) == {}
+
+
+FIRING = """neurovis: 1
+name: firing
+time: {dt: 1 ms, steps: 60}
+models:
+  cell:
+    time: ms
+    state: {v: {derivative: (drive - v)/20}}
+    spike: {when: v >= 1, set: {v: 0}}
+  shown: {time: ms, state: {v: {derivative: (drive - v)/5}}, spike: {when: v >= 1, set: {v: 0}}, activity: v}
+modules: {leg: {neurons: {S: {model: cell, bias: 3}, G: {}, H: {count: 2, model: shown, bias: 2}}}}
+neurons:
+  E: {count: 3, model: cell, bias: 1.2 + i/2}
+  M: {count: 150, model: cell, bias: 1.2 + i/50}
+  Q: {}
+instances: {left: {module: leg}}
+render: {collapse: [left]}
+"""
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_a_raster_has_a_row_for_each_neuron_that_fires(recorded: bool) -> None:
+    """Of many, several share a row; of an instance that is collapsed it is that of its groups."""
+    compiled = nv.compile_text(FIRING)
+    run = compiled.run(60, backend="reference", states=["left.H.spike"])
+    source = RecordedSource(compiled.network, run) if recorded else SimulatedSource(compiled.simulator())
+    while source.step < 59:
+        source.advance()
+    view = view_of(compiled, compiled.gains)
+    ids = {name: f"n{index}" for index, name in enumerate(view.drawn.network.neurons.names)}
+    fired = {name: run[name] != 0 for name in ("E", "M")}
+    fired["left"] = np.column_stack([run["left.S"] != 0, run["left.H.spike"] != 0])
+    asked = ("E2", "E", ("E1", "E3")), ("M150", "M", ("M1", "M150")), ("left", "left", ("left.S", "left.H2"))
+    for item, group, ends in asked:
+        names, rows = view.raster(ids[item])
+        assert names == ends
+        parts = np.array_split(fired[group].astype(float), min(fired[group].shape[1], RASTER_ROWS), axis=1)
+        for bins in (Bins(0, 1, 60), Bins(20, 7, 8)):
+            message = raster_message(3, 5, names, [source.history.read(row, bins) for row in rows], bins)
+            kind, version, place, first, every, count, told, words = struct.unpack_from("<BxHIdIIHH", message)
+            assert (kind, version, place, first, every) == (RASTER, 3, 5, bins.first, bins.every)
+            assert message[28 : 28 + words].decode().split("\n") == list(ends)
+            cells = np.frombuffer(message[28 + words :], np.uint8).reshape(told, count)
+            steps = np.arange(60)
+            for row, part in zip(cells, parts, strict=True):
+                for at, cell in enumerate(row.tolist()):
+                    inside = (steps - bins.first) // bins.every == at
+                    share = part[inside].mean(axis=1).max(initial=0.0)
+                    assert cell == (np.ceil(254 * np.float32(share)) if inside.any() else 255)
+    assert view.raster(ids["Q"]) == ((), ())
+    assert view.raster("n9999") == ((), ())
+    empty = raster_message(3, 5, (), (), Bins(0, 1, 4))
+    assert struct.unpack_from("<BxHIdIIHH", empty)[-2:] == (0, 0)
+    assert len(empty) == 28
+
+
+def test_rasters_are_of_few_neurons() -> None:
+    def asked(rasters: object) -> object:
+        return command_of(
+            json.dumps({"type": "trace", "items": [], "rasters": rasters, "first": 0, "every": 1, "bins": 1})
+        )
+
+    assert asked(["n0", "n7"]) == Trace((), Bins(0, 1, 1), ("n0", "n7"))
+    for wrong in (["c0"], ["n0.spike"], [f"n{index}" for index in range(9)], "n0", [3]):
+        with pytest.raises(ProtocolError):
+            asked(wrong)
 
 
 def test_traces_say_by_numbers_which_names_they_are_of() -> None:

@@ -561,7 +561,7 @@ MESSAGES = st.one_of(
     st.builds(lambda values: {"type": "feed", "name": "push", "values": values}, st.sampled_from([[], [1], [1, 2]])),
     st.sampled_from([{"type": "release", "neurons": "A"}, {"type": "branch"}, {"type": "restart"}, {"type": "pause"},
                      {"type": "look", "items": ["n0", "c99"]},
-                     {"type": "trace", "items": ["n0"], "first": 0, "every": 2, "bins": 9},
+                     {"type": "trace", "items": ["n0"], "rasters": ["n1", "n99"], "first": 0, "every": 2, "bins": 9},
                      {"type": "fetch", "what": "npz", "seconds": 1}]),
 )  # fmt: skip
 

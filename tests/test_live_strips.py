@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from pathlib import Path
 
+import numpy as np
 import pytest
 from chromium import Page
 from test_live_browser import STEP, pause, shown
@@ -269,6 +270,50 @@ def test_states_and_signals_are_chosen_and_pinned(tmp_path: Path) -> None:
             assert await opened.ask(f"{choice.format(1)}.value") == ""
             await opened.ask("document.querySelector('.pin').click()")
             await opened.until("document.querySelectorAll('.trace').length == 1")
+
+    asyncio.run(main())
+
+
+def test_a_group_that_fires_has_a_raster(tmp_path: Path) -> None:
+    spec = """neurovis: 1
+name: fires
+time: {dt: 1 ms, steps: 400}
+models: {cell: {time: ms, state: {v: {derivative: (drive - v)/20}}, spike: {when: v >= 1, set: {v: 0}}}}
+neurons: {K: {count: 3, model: cell, bias: [1.5, 0, 3]}, Q: {}}
+connections: {K -> Q: 1}
+"""
+    (tmp_path / "fires.yaml").write_text(spec, encoding="utf-8")
+
+    async def main() -> None:
+        async with shown(str(tmp_path / "fires.yaml"), tmp_path) as (opened, compiled, _):
+            await opened.until(f"{STEP} > 100")
+            step = await pause(opened)
+            await opened.key("]")
+            await opened.until(f"{TRACE.format(0)}?.startsWith('K')")
+            options = "[...document.querySelector('.what').options].map((one) => one.text).join()"
+            assert await opened.ask(options) == "activity,v,spike,raster"
+            choose = "(s => {{ s.value = '{0}'; s.onchange(); return 1 }})(document.querySelector('.what'))"
+            await opened.ask(choose.format("*"))
+            first = max(0, step - 1000)
+            await opened.until(f"{TRACE.format(0)} == 'raster of K1 … K3 from step {first} to {step}'")
+            #: stretches of ink in the middle of each row, a spike each
+            marks = (
+                "((c, all = c.getContext('2d').getImageData(0, 0, c.width, c.height).data) => [0, 1, 2].map((row) => "
+                "[...Array(c.width).keys()].map((x) => all[4 * (Math.round((row + 0.4) * c.height / 3) * c.width + x) "
+                "+ 3] > 40).filter((on, x, line) => on && !line[x - 1]).length))(document.querySelector('.trace'))"
+            )
+            fired = (compiled.run(step + 1)["K"][first:] != 0).sum(axis=0)
+            found = await opened.ask(marks)
+            assert isinstance(found, list)
+            assert np.abs(np.array(found) - fired).max() <= 1  # a bin may begin before the axis
+            assert found[1] == fired[1] == 0
+            assert fired.max() > 30
+            ends = "[...document.querySelectorAll('.ends .end')].map((one) => one.textContent).join()"
+            assert str(await opened.ask(ends)).startswith("K1,K3")
+            await opened.key("p")
+            await opened.until("document.querySelectorAll('.trace.raster').length >= 1")
+            await opened.ask(choose.format("v"))
+            await opened.until(f"{TRACE.format(0)}?.startsWith('K')")
 
     asyncio.run(main())
 

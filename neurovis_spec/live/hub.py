@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from neurovis_spec.live.commands import Request
 from neurovis_spec.live.desk import Desk
+from neurovis_spec.live.history import Bins
 from neurovis_spec.live.protocol import (
     LookAt,
     Trace,
@@ -28,6 +29,7 @@ from neurovis_spec.live.protocol import (
     body_message,
     command_of,
     frame_message,
+    raster_message,
     refused_message,
     scene_message,
     status_message,
@@ -65,7 +67,7 @@ class Client:
     asked: bool = False
     #: the traces that it wants, and those that it is to be sent
     wanted: Trace | None = None
-    traces: bytes = b""
+    traces: tuple[bytes, ...] = ()
     texts: deque[str | bytes] = field(default_factory=lambda: deque(maxlen=_TEXTS))
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -174,12 +176,20 @@ class Hub:
                 members = shown.view.members(item)
                 if members is not None:
                     traces[shown.view.place(item)] = shown.history.read(members, wanted.bins)
-            client.traces = trace_message(self._version, traces, wanted.bins)
+            client.traces = (
+                trace_message(self._version, traces, wanted.bins),
+                *(self._raster(shown, item, wanted.bins) for item in wanted.rasters),
+            )
             client.wake.set()
         now = self._loop.time()
         self._rest = now + _REST * (now - begun)
         if self._waiting:
             self._reader = self._loop.call_at(self._rest, self._read_traces)
+
+    def _raster(self, shown: Shown, item: str, bins: Bins) -> bytes:
+        names, members = shown.view.raster(item)
+        place, _ = shown.view.place(item)
+        return raster_message(self._version, place, names, [shown.history.read(one, bins) for one in members], bins)
 
     def drawn(self, client: Client, serial: int) -> None:
         """A client has drawn a frame, and so those before it."""
@@ -216,8 +226,8 @@ class Hub:
             values = shown.view.values(shown.seen, client.items, shown.quantities)
             yield values_message(shown.glance.step, values)
         if client.traces:
-            traces, client.traces = client.traces, b""
-            yield traces
+            traces, client.traces = client.traces, ()
+            yield from traces
 
     def _take(self) -> None:
         self._scheduled = False

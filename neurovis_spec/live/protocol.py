@@ -51,7 +51,7 @@ from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
-SCENE, FRAME, TRACE, FILE = 1, 2, 3, 4
+SCENE, FRAME, TRACE, FILE, RASTER = 1, 2, 3, 4, 5
 #: kind, scene
 _SCENE_HEAD = struct.Struct("<BxH")
 #: kind, scene, serial, changed, step, first, last, bytes of the caption, numbers of the pose
@@ -60,6 +60,10 @@ _HEAD = struct.Struct("<BxHIIdddHH")
 _POSED = (1 << 16) - 1
 #: kind, scene, traces, the bins: the first step, steps in each, how many
 _TRACE_HEAD = struct.Struct("<BxHIdII")
+#: kind, scene, item, the bins as those of traces, how many rows, bytes of the names
+_RASTER_HEAD = struct.Struct("<BxHIdIIHH")
+#: What a cell of a raster is of whose steps nothing is known; a share of 1 is one less.
+_UNKNOWN = 255
 #: A message of a client: at most so many bytes, names so many characters.
 LARGEST, _LONGEST = 16_384, 4096
 #: The most steps there can be (a double holds each).
@@ -71,8 +75,8 @@ _MANY = 1024
 _WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}(\.[A-Za-z_]\w{0,4095})?", re.ASCII)
 #: The gains of Eqs. 2–5.
 _GAINS = ("activity", "signal", "thickness", "change")
-#: The most items that a client is sent traces of at once, the most bins, and steps in each.
-_TRACED, _BINS, _EVERY = 24, 2048, 1 << 32
+#: The most items that a client is sent traces of at once, and rasters, the most bins, and steps in each.
+_TRACED, _RASTERS, _BINS, _EVERY = 24, 8, 2048, 1 << 32
 #: The most turns and events that are listed, the latest turns and the first events.
 _LISTED = 1000
 #: The most steps that are made at once.
@@ -157,6 +161,16 @@ def trace_message(version: int, traces: Mapping[tuple[int, int], Range], bins: B
     return b"".join([head, items.tobytes(), *(trace.astype("<f4").tobytes() for trace in traces.values())])
 
 
+def raster_message(version: int, item: int, names: Sequence[str], rows: Sequence[Range], bins: Bins) -> bytes:
+    """The spikes of neurons in rows, of each the ranges of the share that fires; ``names`` are those of the first and
+    the last neuron. The largest share of each bin is a byte: at least 1 where any fires."""
+    shares = np.array([row[:, 1] for row in rows], np.float64).reshape(len(rows), bins.count)
+    cells = np.where(np.isnan(shares), _UNKNOWN, np.ceil((_UNKNOWN - 1) * np.clip(shares, 0, 1))).astype(np.uint8)
+    words = "\n".join(names).encode()[: (1 << 16) - 1]
+    head = _RASTER_HEAD.pack(RASTER, version, item, bins.first, bins.every, bins.count, len(rows), len(words))
+    return head + words + cells.tobytes()
+
+
 def findings_message(text: str, errors: bool) -> str:
     """What was noticed about an edited spec, as ``validate`` shows it; nothing: all is well."""
     return _text("findings", text=text, errors=errors)
@@ -216,10 +230,12 @@ class LookAt:
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """The client wants to be sent once how some items went, in bins of steps; viewers may ask for it, too."""
+    """The client wants to be sent once how some items went, in bins of steps, and the ``rasters`` of the groups of some
+    neurons; viewers may ask for it, too."""
 
     items: tuple[str, ...]
     bins: Bins
+    rasters: tuple[str, ...] = ()
 
 
 def acknowledged(data: bytes) -> Acknowledged:
@@ -348,16 +364,24 @@ def _items(value: object) -> tuple[str, ...]:
     raise ProtocolError(f"at most {_WATCHED} ids of neurons and connections are wanted")
 
 
-def _trace(items: tuple[str, ...], first: int, every: int, bins: int) -> Trace:
-    if len(items) > _TRACED:
-        raise ProtocolError(f"at most {_TRACED} traces are wanted")
-    return Trace(items, Bins(first, every, bins))
+def _trace(items: tuple[str, ...], first: int, every: int, bins: int, rasters: tuple[str, ...] = ()) -> Trace:
+    if len(items) > _TRACED or len(rasters) > _RASTERS:
+        raise ProtocolError(f"at most {_TRACED} traces and {_RASTERS} rasters are wanted")
+    if any(item[0] != "n" or "." in item for item in rasters):
+        raise ProtocolError("rasters are of neurons")
+    return Trace(items, Bins(first, every, bins), rasters)
 
 
 _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command | Request | LookAt | Trace]]]] = {
     "look": ({"items": _items}, LookAt),
     "trace": (
-        {"items": _items, "first": _whole(0, _MOST), "every": _whole(1, _EVERY), "bins": _whole(1, _BINS)},
+        {
+            "items": _items,
+            "rasters": _items,
+            "first": _whole(0, _MOST),
+            "every": _whole(1, _EVERY),
+            "bins": _whole(1, _BINS),
+        },
         _trace,
     ),
     "play": ({}, Play),
@@ -383,6 +407,6 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "fetch": ({"what": _one_of("svg", "film", "npz"), "seconds": _seconds}, Fetch),
 }
 #: Members that a message need not have.
-_OPTIONAL: Final = {"moving"}
+_OPTIONAL: Final = {"moving", "rasters"}
 #: The types of the messages that a client may send, for the tests of the documentation.
 MESSAGES: Final = tuple(_MESSAGES)

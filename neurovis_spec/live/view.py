@@ -18,7 +18,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import SYNAPSE
+from neurovis_spec.compiler.program import SPIKE, SYNAPSE
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.commands import AS_IT_IS, Appearance
 from neurovis_spec.live.declared import declared
@@ -43,6 +43,8 @@ LEVELS = 127
 _NO_LEVEL = -LEVELS - 1
 #: Widths are counted in these parts of a user unit, up to what 16 bits hold.
 FINENESS, _WIDEST = 16, (1 << 16) - 1
+#: The most rows of a raster; of more neurons several share one.
+RASTER_ROWS = 64
 #: Bits of a kind: a line that ends in no arrow, what is lesioned, a connection that inhibits, as its synapse or its
 #: negative weight says, a clamped neuron, a neuron whose activity is no finite number.
 BAR, FAINT, NEGATIVE, CLAMPED, UNDEFINED = 1, 2, 4, 4, 8
@@ -149,6 +151,22 @@ class View:
             places = self.quantities.places("neuron" if neurons else "connection", name, members)
             found = Members("quantities", places, added=not neurons and name == SYNAPSE.gives)
         return found if len(found.indices) else None
+
+    def raster(self, item: str) -> tuple[tuple[str, ...], tuple[Members, ...]]:
+        """Of the groups of the neurons that an item (``n3``) is drawn for those that fire: the names of the first and
+        the last, and the spikes of each, or of some neighbours together, in their order; none where nobody fires."""
+        whole = self.drawn.whole.neurons
+        drawn = np.flatnonzero(self.drawn.unit == int(item[1:]))
+        starts = [group.start for group in whole.groups]
+        own = [whole.groups[place] for place in np.unique(np.searchsorted(starts, drawn, "right") - 1).tolist()]
+        members = np.concatenate([np.zeros(0, np.int64), *(np.asarray(group.indices) for group in own)])
+        fires = [block.neurons for block in self.quantities.blocks if block.state == SPIKE]
+        firing = members[np.isin(members, np.concatenate([members[:0], *fires]))]
+        if not len(firing):
+            return (), ()
+        rows = np.array_split(firing, min(len(firing), RASTER_ROWS))
+        places = (self.quantities.places("neuron", SPIKE, row) for row in rows)
+        return (whole.names[firing[0]], whole.names[firing[-1]]), tuple(Members("quantities", of) for of in places)
 
     def place(self, item: str) -> tuple[int, int]:
         """The number of an item that there is among connections, then neurons; and that of its name among those that

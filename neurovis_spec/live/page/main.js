@@ -131,6 +131,9 @@ const link = new Link({
   traces(traces) {
     strips.take(traces);
   },
+  raster(raster) {
+    strips.raster(raster);
+  },
   file(name, blob) {
     download(blob, name);
   },

@@ -25,6 +25,9 @@ import { isStill } from './camera.js';
  *   themed: boolean, named: string[][], names: number[], order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
  *   groups: Group[]}} Scene */
 /** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */
+/** The spikes of some neurons, a row each: in cells (rows × bins) the share that fires, in 254ths, 255 where nothing is known; the
+ * names of the first and the last.
+ * @typedef {{id: string, first: number, every: number, bins: number, rows: number, ends: string[], cells: Uint8Array}} Raster */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
  *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array, pose: Float32Array}} Look */
 /** How the pose of a body is drawn: links are two points and a radius in metres, solids the lowest and the highest corner.
@@ -41,6 +44,7 @@ import { isStill } from './camera.js';
  *   | {type: 'saving', files: string[], diff: string, written: boolean}
  *   | {type: 'refused', reason: string}} Message */
 /** @typedef {{scene: (scene: Scene) => void, frame: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
+ *   raster: (raster: Raster) => void,
  *   text: (message: Message) => void, link: (open: boolean) => void}} Listener */
 
 /** Where little is to move, frames are taken over so many milliseconds after each other: fewer than three flashes a second. */
@@ -49,6 +53,7 @@ const SCENE = 1,
   FRAME = 2,
   TRACE = 3,
   FILE = 4,
+  RASTER = 5,
   HEAD = 40;
 
 /** Unpack a scene. @param {ArrayBuffer} buffer @returns {Promise<Scene>} */
@@ -114,6 +119,22 @@ function unpackTraces(buffer, scene) {
     ranges.set(id + name, new Float32Array(buffer, 24 + 8 * count + 8 * bins * at, 2 * bins));
   });
   return { first: view.getFloat64(8, true), every: view.getUint32(16, true), ranges };
+}
+
+/** Unpack a raster. @param {ArrayBuffer} buffer @param {Scene} scene @returns {Raster} */
+function unpackRaster(buffer, scene) {
+  const view = new DataView(buffer),
+    bins = view.getUint32(20, true),
+    [rows, words] = [24, 26].map((at) => view.getUint16(at, true));
+  return {
+    id: `n${view.getUint32(4, true) - scene.lines}`,
+    first: view.getFloat64(8, true),
+    every: view.getUint32(16, true),
+    bins,
+    rows,
+    ends: new TextDecoder().decode(new Uint8Array(buffer, 28, words)).split('\n'),
+    cells: new Uint8Array(buffer, 28 + words, rows * bins),
+  };
 }
 
 /** What stands for the websocket where the page is in the frame of a notebook: the port that the frame is handed. */
@@ -230,6 +251,8 @@ export class Link {
       this.listener.file(new TextDecoder().decode(data.slice(4, from)), new Blob([data.slice(from)]));
     } else if (kind === TRACE && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.traces(unpackTraces(data, this.scene));
+    } else if (kind === RASTER && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
+      this.listener.raster(unpackRaster(data, this.scene));
     }
   }
 

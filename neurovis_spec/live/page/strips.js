@@ -9,6 +9,7 @@ import { THUMB } from './scrubber.js';
 /** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Raster} Raster */
 /** @typedef {import('./protocol.js').Traces} Traces */
 /** @typedef {import('./scrubber.js').Scrubber} Scrubber */
 /** What it shows of a neuron or a connection: its activity or weight where `what` is empty; `key` is what that is asked by,
@@ -18,6 +19,9 @@ import { THUMB } from './scrubber.js';
 
 /** What a model with a spike block has, 1 in the steps in which it fires. */
 const SPIKE = 'spike';
+
+/** What a strip shows that is the raster of a neuron's group: no name. */
+const RASTER = '*';
 
 /** The most strips that are pinned; how high marks of spikes are; milliseconds between two traces that are asked for, and until one is asked for again. */
 const PINS = 8,
@@ -105,17 +109,20 @@ export class Strips {
     const called = group ? group.title.split('\n')[0] : '',
       isPinned = strip !== this.held;
     [strip.id, strip.data] = group ? [group.id, JSON.stringify(group.data)] : ['', ''];
-    const names = namesOf(this.link.scene, strip.id);
-    strip.what = names.includes(what) ? what : '';
+    const names = namesOf(this.link.scene, strip.id),
+      fires = strip.id[0] === 'n' && names.includes(SPIKE);
+    strip.what = names.includes(what) || (fires && what === RASTER) ? what : '';
+    strip.canvas.classList.toggle('raster', strip.what === RASTER);
     strip.key = strip.what ? `${strip.id}.${strip.what}` : strip.id;
-    strip.told = strip.what ? `${called}, ${strip.what}` : called;
+    strip.told = strip.what === RASTER ? `the group of ${called}` : strip.what ? `${called}, ${strip.what}` : called;
     const again = !isPinned && this.pinned.some(({ key }) => key === strip.key);
     const first = group?.data.neuron === undefined ? 'weight' : (group.data.state ?? 'activity');
     strip.choice.replaceChildren(
       ...[first, ...names.filter((one) => one !== first)].map((one, at) => new Option(one, at ? one : '')),
+      ...(fires ? [new Option('raster', RASTER)] : []),
     );
     strip.choice.value = strip.what;
-    strip.choice.hidden = !names.some((one) => one !== first);
+    strip.choice.hidden = !fires && !names.some((one) => one !== first);
     strip.choice.setAttribute('aria-label', `what is shown of ${called}`);
     strip.name.textContent = called;
     strip.name.title = called;
@@ -123,7 +130,7 @@ export class Strips {
     strip.pin.setAttribute('aria-label', `${isPinned ? 'unpin' : 'pin'} ${strip.told}`);
     strip.pin.hidden = again || (!isPinned && this.pinned.length >= PINS);
     this.place.classList.toggle('nothing', !this.held.id);
-    strip.canvas.setAttribute('aria-label', `trace of ${strip.told}`);
+    strip.canvas.setAttribute('aria-label', `${strip.what === RASTER ? 'raster' : 'trace'} of ${strip.told}`);
     this.clear(strip);
   }
 
@@ -174,12 +181,19 @@ export class Strips {
 
   /** By what the spikes are asked for that are marked in a strip; '' where none are. @param {Strip} strip */
   marks({ id, what }) {
-    return id[0] === 'n' && what !== SPIKE && namesOf(this.link.scene, id).includes(SPIKE) ? `${id}.${SPIKE}` : '';
+    return id[0] === 'n' && what !== SPIKE && what !== RASTER && namesOf(this.link.scene, id).includes(SPIKE)
+      ? `${id}.${SPIKE}`
+      : '';
   }
 
   /** Have the values of what is shown asked for. */
   want() {
-    this.attention.also = [...this.pinned, this.held].map(({ key }) => key);
+    this.attention.also = this.traced().map(({ key }) => key);
+  }
+
+  /** The strips that show traces. */
+  traced() {
+    return [...this.pinned, this.held].filter(({ what }) => what !== RASTER);
   }
 
   /** Show the strips that there are. */
@@ -198,8 +212,10 @@ export class Strips {
     if (!look) return;
     const { low, high, events, known: turned } = this.scrubber,
       width = Math.max(1, this.held.canvas.clientWidth - 2 * THUMB);
-    const strips = [...this.pinned, this.held];
-    const items = [...new Set(strips.flatMap((strip) => [strip.key, this.marks(strip)]))].filter(Boolean);
+    const traced = this.traced(),
+      others = [...this.pinned, this.held].filter((strip) => !traced.includes(strip));
+    const items = [...new Set(traced.flatMap((strip) => [strip.key, this.marks(strip)]))].filter(Boolean),
+      rasters = [...new Set(others.map(({ id }) => id))].slice(0, PINS);
     for (const { key, value } of [...this.pinned, this.held]) {
       const now = this.attention.values[key],
         words = key && now !== undefined ? signed(now) : '';
@@ -208,8 +224,19 @@ export class Strips {
     const every = Math.max(1, Math.ceil((high - low + 1) / Math.min(width, 2000))),
       now = performance.now();
     const first = Math.floor(low / every) * every;
-    const wanted = [look.last, low, high, width, devicePixelRatio, events.length, turned.length, ...items].join(' ');
-    if (!items.length || wanted === this.asked) return;
+    const wanted = [
+      look.last,
+      low,
+      high,
+      width,
+      devicePixelRatio,
+      events.length,
+      turned.length,
+      ...items,
+      '/',
+      ...rasters,
+    ].join(' ');
+    if (!(items.length || rasters.length) || wanted === this.asked) return;
     const wait = this.when + (this.waiting ? LOST : PACE) - now;
     clearTimeout(this.timer);
     if (wait > 0) {
@@ -217,7 +244,8 @@ export class Strips {
       return;
     }
     [this.asked, this.when, this.waiting] = [wanted, now, true];
-    this.link.ask('trace', { items, first, every, bins: Math.floor((high - first) / every) + 1 });
+    const more = rasters.length ? { rasters } : {};
+    this.link.ask('trace', { items, first, every, bins: Math.floor((high - first) / every) + 1, ...more });
   }
 
   /** Traces have come. @param {Traces} traces */
@@ -230,12 +258,51 @@ export class Strips {
     this.show();
   }
 
+  /** A raster has come. @param {Raster} raster */
+  raster(raster) {
+    for (const strip of [...this.pinned, this.held]) {
+      if (strip.what === RASTER && strip.id === raster.id) this.dot(strip, raster);
+    }
+  }
+
+  /** A canvas as large as it is shown, empty, and how far across it a step is.
+   * @param {HTMLCanvasElement} canvas @returns {[CanvasRenderingContext2D, (step: number) => number]} */
+  blank(canvas) {
+    const { clientWidth: width, clientHeight: height } = canvas,
+      context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+    [canvas.width, canvas.height] = [width * devicePixelRatio, height * devicePixelRatio];
+    context.scale(devicePixelRatio, devicePixelRatio);
+    return [context, (step) => THUMB + this.scrubber.across(step) * (width - 2 * THUMB)];
+  }
+
+  /** Draw a raster: a row for each neuron, in it a mark where it fires; of several in a row as strong as their share.
+   * @param {Strip} strip @param {Raster} raster */
+  dot(strip, { first, every, bins, rows, ends, cells }) {
+    const { canvas } = strip,
+      [context, x] = this.blank(canvas),
+      row = (canvas.clientHeight - 4) / Math.max(1, rows),
+      wide = Math.max(1, x(every) - x(0));
+    let known = false;
+    context.fillStyle = getComputedStyle(canvas).color;
+    cells.forEach((share, at) => {
+      known ||= share < 255;
+      if (share === 0 || share === 255) return;
+      context.globalAlpha = Math.max(0.25, share / 254);
+      const middle = x(first + (at % bins) * every + (every - 1) / 2);
+      context.fillRect(middle - wide / 2, 2 + Math.floor(at / bins) * row, wide, Math.max(1, row - (row > 3 ? 1 : 0)));
+    });
+    [strip.ends[0].textContent, strip.ends[1].textContent] = [ends[0], ends[1] === ends[0] ? '' : (ends[1] ?? '')];
+    const steps = `from step ${this.scrubber.low} to ${this.scrubber.high}`,
+      which = ends[1] === ends[0] ? ends[0] : ends.join(' … ');
+    canvas.setAttribute('aria-label', `raster of ${which} ${steps}${known ? '' : ': nothing is known of these steps'}`);
+  }
+
   /** Draw a trace: a line, up and down in each bin where it has several steps; above it marks where it fires, unless the
    * trace itself shows that. @param {Strip} strip @param {Float32Array} trace @param {Traces} traces
    * @param {Float32Array} [spikes] */
   paint(strip, trace, { first, every }, spikes) {
     const { canvas } = strip,
-      context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+      [context, x] = this.blank(canvas);
     const { clientWidth: width, clientHeight: height } = canvas,
       style = getComputedStyle(canvas),
       { scrubber } = this;
@@ -250,10 +317,6 @@ export class Strips {
     [high, low].forEach((end, at) => {
       strip.ends[at].textContent = known && (at === 0 || high > low) ? short(end) : '';
     });
-    [canvas.width, canvas.height] = [width * devicePixelRatio, height * devicePixelRatio];
-    context.scale(devicePixelRatio, devicePixelRatio);
-    /** @param {number} step */
-    const x = (step) => THUMB + scrubber.across(step) * (width - 2 * THUMB);
     /** @param {number} value */
     const y = (value) => top + room * (high > low ? (high - Math.min(high, Math.max(low, value))) / (high - low) : 0.5);
     context.strokeStyle = style.borderTopColor;
