@@ -102,8 +102,7 @@ class PairFormulas:
         return values
 
     def rows(self, formula: Formula, role: Role) -> Rows | Unknown:
-        """A formula over all pairs, a few rows at a time, on which the structure depends; of one that is the same for
-        all of them a number would do."""
+        """A formula over all pairs, a few rows at a time, on which the structure depends."""
         if self.sources is UNKNOWN or self.targets is UNKNOWN:
             self._tree(formula, role, UNKNOWN)
             return UNKNOWN
