@@ -15,6 +15,7 @@ import pytest
 from data_attempts import HERE
 from hypothesis import given
 from hypothesis import strategies as st
+from lsp_marks import marked
 from small_specs import HEAD, answer, codes, compiled, network_of, wires
 
 import neurovis_spec as nv
@@ -26,6 +27,7 @@ from neurovis_spec.language.data.edge_list import parse_edges
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.tables import Condition, EdgeFile, FileReference
 from neurovis_spec.language.yaml.source import Scalar
+from neurovis_spec.lsp.completion import complete
 
 #: As a connectome is given away: a row a pair of cells, both kinds of connections together.
 WORM = "Source\tTarget\tType\tN\tdelay_ms\tE_rev\nAVAL\tAVAR\tchemical\t3\t1\t0\nAVAR\tAVBL\telectrical\t1\t\t\n"
@@ -491,3 +493,27 @@ def test_a_sheet_holds_what_was_written(rows: list[tuple[str, str]], windows: bo
         got = sheet.parse_sheet(text.getvalue().encode(), "a.csv")
     assert got.texts(located("text")) == tuple(" ".join(row[0].split("\n")).strip() for row in rows)
     np.testing.assert_array_equal(got.numbers(located("number")), [float(row[1] or "nan") for row in rows])
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [
+        ("neurons: {K: {bias: {file: c.csv, ¦}}}", {"column", "by", "default", "where", "key", "csv"}),
+        ("neurons: {K: {names: {file: c.csv, ¦}}}", {"column", "where", "key", "csv"}),
+        ("neurons: {K: {position: {file: c.csv, ¦}}}", {"columns", "by", "where", "key", "csv"}),
+        ("neurons: {K: {}}\nconnections: {K -> K: {edges: {file: c.csv, ¦}}}", {"columns", "where", "key"}),
+        (
+            "neurons: {K: {}}\nconnections: {K -> K: {edges: {file: c.csv, columns: {¦}}}}",
+            {"from", "to", "weight", "delay"},
+        ),
+        (
+            "neurons: {K: {}}\nconnections: {K -> K: {edges: {file: c.csv, columns: {delay: {unit: ¦}}}}}",
+            {"s", "ms", "us", "min"},
+        ),
+        ("neurons: {K: {model: {leaky_integrator: {leak: {file: c.csv, ¦}}}}}", {"column", "by", "default", "where"}),
+    ],
+)
+def test_an_editor_offers_the_keys_of_tables(text: str, keys: set[str]) -> None:
+    offered = {item.label for item in complete(*marked(HEAD + text))}
+    assert keys <= offered
+    assert "count" not in offered

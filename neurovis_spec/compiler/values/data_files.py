@@ -69,7 +69,8 @@ class _Shelf(Generic[T]):
 
 @dataclass
 class OpenSheet:
-    """A table whose columns have names, each of which is read once as numbers or texts."""
+    """A table whose columns have names, each of which is read once as numbers or texts. What is wrong with one is told
+    where it is named first."""
 
     sheet: Sheet
     named: NamedFile
@@ -81,14 +82,14 @@ class OpenSheet:
         """A column of numbers, NaN where a cell is empty; UNKNOWN where one is invalid, which is reported."""
         if column.value not in self._numbers:
             read = partial(self.sheet.numbers, column)
-            self._numbers[column.value] = read_column(self.named, read, self.findings)
+            self._numbers[column.value] = read_column(self.named._replace(span=column.span), read, self.findings)
         return self._numbers[column.value]
 
     def texts(self, column: Located[str]) -> tuple[str, ...] | Unknown:
         """A column of texts, "" where a cell is empty."""
         if column.value not in self._texts:
             read = partial(self.sheet.texts, column)
-            self._texts[column.value] = read_column(self.named, read, self.findings)
+            self._texts[column.value] = read_column(self.named._replace(span=column.span), read, self.findings)
         return self._texts[column.value]
 
 

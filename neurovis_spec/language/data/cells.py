@@ -11,7 +11,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -147,6 +147,13 @@ def _with_line_feeds(parts: Iterable[bytes]) -> Iterator[bytes]:
 def count_lines(text: Iterable[bytes]) -> int:
     """How many lines of a text end."""
     return sum(lines.count(b"\n") + 1 for lines in text) - 1
+
+
+def lines_in(parts: Sequence[bytes]) -> int:
+    """The same of a file in parts."""
+    if any(b"\r" in part for part in parts):
+        return count_lines(text_of(parts))
+    return sum(part.count(b"\n") for part in parts)
 
 
 def check_text(text: Iterable[bytes], separator: Separator = COMMAS) -> None:

@@ -25,10 +25,10 @@ from neurovis_spec.language.data.cells import (
     Separator,
     below,
     check_text,
-    count_lines,
     counted,
     first_row,
     given_up,
+    lines_in,
     number_of,
     rows_of,
     separated,
@@ -151,7 +151,7 @@ def parse_edges(parts: list[bytes], room: Room | None = None, file: EdgeFile | N
     the file as a whole."""
     strip_end(parts)
     separator = separator_of(parts, "" if file is None else file.file.path.value) if parts else COMMAS
-    most = count_lines(text_of(parts))
+    most = lines_in(parts)
     if room is not None and not (file and file.where):  # else it is asked while rows are taken
         room(most)
     check_text(text_of(parts, separator), separator)

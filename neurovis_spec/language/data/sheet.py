@@ -18,9 +18,9 @@ from neurovis_spec.language.data.cells import (
     Separator,
     below,
     check_text,
-    count_lines,
     counted,
     first_row,
+    lines_in,
     number_of,
     rows_of,
     separator_of,
@@ -173,7 +173,7 @@ def parse_sheet(data: bytes, path: str, where: tuple[Condition, ...] = (), most:
         raise in_row(1, f"has {cells:,} cells; a table has {MOST_COLUMNS:,} columns at most")
     first = first_row(text_of(parts, separator), separator)
     header = tuple(first.stripped().cells)
-    lines_below = count_lines(text_of(parts))
+    lines_below = lines_in(parts)
     check_rows(lines_below, most)
     check_cells(lines_below * len(header))
     conditions, faults, found, rows = picked(where, header), Faults(), list[_Some](), 0
