@@ -442,6 +442,15 @@ def test_what_is_exported_is_read_back(tmp_path: Path) -> None:
         compiled(again, tmp_path).export(tmp_path / "out", "csv")
 
 
+def test_positions_in_space_are_exported_whole(tmp_path: Path) -> None:
+    network = compiled("neurons: {A: {count: 2, bias: 1, position: [[0, 0, 1], [1, 0, 2]]}}")
+    network.export(tmp_path, "csv")
+    table = "file: neurons.csv"
+    text = f"neurons: {{A: {{count: 2, bias: {{{table}, column: bias}}, position: {{{table}, columns: [x, y, z]}}}}}}"
+    assert network_of(text, tmp_path).neurons.position.tolist() == [[0, 0, 1], [1, 0, 2]]
+    assert compiled(text, tmp_path).hash == network.hash
+
+
 def test_delays_that_are_continuous_are_exported_as_such(tmp_path: Path) -> None:
     text = (
         "time: {dt: 1 ms}\nmodels: {m: {state: {v: {initial: 1, derivative: drive - v}}, activity: v}}\n"

@@ -59,7 +59,8 @@ def _neurons(network: Network) -> dict[str, Sequence[object]]:
         "group": [group.name for group in neurons.groups for _ in group.indices],
     }
     if not np.isnan(neurons.position).all():
-        columns |= {axis: _cells(neurons.position[:, at]) for at, axis in enumerate(("x", "y"))}
+        axes = zip("xyz", neurons.position.T, strict=False)  # as many as positions have numbers
+        columns |= {axis: _cells(values) for axis, values in axes}
     columns["bias"] = neurons.bias.tolist()
     if not np.isnan(neurons.initial).all():
         columns["initial"] = _cells(neurons.initial)
