@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -40,13 +40,17 @@ from neurovis_spec.cli.options import (
 )
 from neurovis_spec.cli.progress import progress
 
+if TYPE_CHECKING:
+    from neurovis_spec.analysis.report import Measured, ReportOptions
+    from neurovis_spec.arrays import FloatArray
+
 #: groups that spike are printed up to so many
 _MOST_GROUPS: Final = 20
 
 
 @dataclass(frozen=True)
 class Measuring:
-    """What of a run is measured, as the command line says it."""
+    """What of a run is measured, and how that is printed (``form``), as the command line says it."""
 
     of: tuple[str, ...]
     start: int | None
@@ -54,6 +58,7 @@ class Measuring:
     threshold: float
     bins: int
     trials: bool
+    form: str
     theme: str | None
 
 
@@ -81,6 +86,9 @@ measuring_options: Final = as_one(
         default=True,
         help="Make the further runs that importance and sensitivity need (default), or leave these out.",
     ),
+    click.option(
+        "--format", "form", type=click.Choice(["text", "json"]), default="text", help="text (default) or a JSON object."
+    ),
     theme_option,
 )
 
@@ -106,9 +114,6 @@ measuring_options: Final = as_one(
 @click.option("--recording", metavar="FILE", shell_complete=paths, help="Measure this; without it the network is run.")
 @run_option
 @measuring_options
-@click.option(
-    "--format", "form", type=click.Choice(["text", "json"]), default="text", help="text (default) or a JSON object."
-)
 @set_option
 @input_option
 @body_options
@@ -118,7 +123,6 @@ def command(
     recording: str | None,
     run: int | None,
     measuring: Measuring,
-    form: str,
     settings: dict[str, float | str],
     inputs: dict[str, str],
 ) -> None:
@@ -137,7 +141,7 @@ def command(
         raise click.UsageError(f"--to {stop} is not behind --from {start}: there is no step to measure")
     if find_spec("jinja2") is None:
         raise fault("the page needs jinja2, which is not installed", "pip install 'neurovis-spec[analyze]'")
-    from neurovis_spec.analysis.report import ReportOptions, file_names, measure
+    from neurovis_spec.analysis.report import file_names, measure
 
     check_folder(output)
     read = [("the spec itself", spec), ("the recording that is measured", recording), *files_of(inputs)]
@@ -147,26 +151,36 @@ def command(
     network = network_of(spec, settings)
     for name in file_names():
         check_files(output / name, network)
-    record, arrays = recording_of(recording, run), tables(inputs, network.network)
-    options = ReportOptions(
+    record, options = recording_of(recording, run), _options(measuring, tables(inputs, network.network))
+    with progress("measuring") as bar, writing(output):
+        made = measure(network, record, options, bar)
+        files = made.write(output)
+    if measuring.form == "json":
+        _print_json(made, output, files)
+        return
+    _print_firing(files)
+    click.echo(f"{output}: {count(len(files), 'file')}; open {output / 'index.html'}")
+
+
+def _options(measuring: Measuring, inputs: dict[str, FloatArray]) -> ReportOptions:
+    from neurovis_spec.analysis.report import ReportOptions
+
+    return ReportOptions(
         of=measuring.of or None,
-        start=start,
-        stop=stop,
+        start=measuring.start,
+        stop=measuring.stop,
         threshold=measuring.threshold,
         bins=measuring.bins,
         trials=measuring.trials,
         theme=measuring.theme,
-        inputs=arrays,
+        inputs=inputs,
     )
-    with progress("measuring") as bar, writing(output):
-        made = measure(network, record, options, bar)
-        files = made.write(output)
-    if form == "json":
-        written = {"folder": str(output), "files": [file.name for file in files]}
-        click.echo(json.dumps({**made.plain, **written}, indent=2, ensure_ascii=False, allow_nan=False))
-        return
-    _print_firing(files)
-    click.echo(f"{output}: {count(len(files), 'file')}; open {output / 'index.html'}")
+
+
+def _print_json(made: Measured, output: Path, files: Sequence[Path]) -> None:
+    """What was measured, and the files that have it, as an object."""
+    written = {"folder": str(output), "files": [file.name for file in files]}
+    click.echo(json.dumps({**made.plain, **written}, indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def _print_firing(files: Sequence[Path]) -> None:
