@@ -105,7 +105,7 @@ def kind(field: FieldInfo) -> str:
     """What may be written at a field, in words.
 
     >>> kind(GroupModel.model_fields["bias"]), kind(ConnectionModel.model_fields["rows"])
-    ('number or expression or list or mapping', 'from, to')
+    ('number or expression or list or {file: …} or mapping', 'from, to')
     """
     found = dict.fromkeys(word for word in map(_word, fitting(field)) if word)
     words = sorted(found, key="mapping".__eq__)  # which comes last
