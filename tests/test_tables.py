@@ -12,7 +12,7 @@ from unittest.mock import patch
 import numpy as np
 import pandas
 import pytest
-from data_attempts import HERE
+from data_attempts import HERE, fault, table
 from hypothesis import given
 from hypothesis import strategies as st
 from lsp_marks import marked
@@ -140,6 +140,23 @@ def test_what_is_no_column_of_edges(tmp_path: Path) -> None:
 )
 def test_what_separates_cells_is_found_by_looking(name: str, text: str, noun: str) -> None:
     assert separator_of([text.encode()], name).noun == noun
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("a.tsv", "a\tb\n1\t2\n\t-4e1\n"), ("a.txt", "a;b\n1;2\n;-4e1\n"), ("a.dat", "1, 2\n, -4e1\n")],
+)
+def test_tables_of_numbers_between_something_else(name: str, text: str, tmp_path: Path) -> None:
+    got = table(tmp_path, name, text)
+    np.testing.assert_array_equal(got.values, [[1, 2], [np.nan, -40]])
+    (tmp_path / "b.txt").write_text(" 1   2\n 3   4 \n")
+    matrix = "neurons: {A: {count: 2, bias: 1}, B: {count: 2}}\nconnections: {A -> B: {matrix: {file: b.txt}}}"
+    assert [one[2] for one in wires(network_of(matrix, tmp_path))] == [1, 2, 3, 4]
+    told = fault(tmp_path, "c.txt", "1;2\n3;4,5\n")
+    assert "row 2 has a comma, and semicolons separate its cells" in told.message
+    assert told.hint == "numbers have a decimal point"
+    assert "row 2, column 2: 'x' is no number" in fault(tmp_path, "d.txt", "1 2\n3  x\n").message
+    assert "the file is empty" in fault(tmp_path, "e.txt", "").message
 
 
 @given(
@@ -353,13 +370,13 @@ def test_edges_in_arrays(name: str, tmp_path: Path) -> None:
 def test_arrays_that_are_no_table(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", x=np.arange(2.0), y=np.arange(3), z=np.eye(2), w=np.array([1, np.inf]))
     (tmp_path / "b.parquet").write_bytes(b"PAR1" + bytes(100) + b"PAR1")
-    for table, told in (
+    for written, told in (
         ("file: a.npz, column: z", "'z': an array of 2 dimensions where one is wanted"),
         ("file: a.npz, by: x, column: y", "'x' has 2 values, another column 3"),
         ("file: a.npz, column: w", "row 2, column 4: this is infinity"),
         ("file: b.parquet, column: x", "this is no .parquet file, or it is damaged"),
     ):
-        assert told in answer(f"neurons: {{K: {{count: 2, bias: {{{table}}}}}}}", tmp_path)[1]
+        assert told in answer(f"neurons: {{K: {{count: 2, bias: {{{written}}}}}}}", tmp_path)[1]
 
 
 def test_a_parquet_without_its_reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,6 +62,7 @@ from neurovis_spec.language.located import (
 from neurovis_spec.language.model import Filled, Keyed, Model, Named, Short, entry_hint
 from neurovis_spec.language.patterns import PATTERNS, PatternField
 from neurovis_spec.language.tables import (
+    DATA_FILES,
     FILE,
     NAMES,
     PLACES,
@@ -641,8 +642,6 @@ def _in_parts(mapping: Mapping, info: ValidationInfo) -> bool:
     return True
 
 
-#: What the names of data files end with.
-_FILES = (".csv", ".npy", ".npz", ".mtx")
 #: How other languages call the ends of a connection.
 _ENDS = ("from", "to", "source", "target", "pre", "post")
 
@@ -663,7 +662,7 @@ def _body(entry: Entry, info: ValidationInfo) -> Mapping:
         refuse(info, node, "a weight or a mapping", hint)
     if node.value is None:
         return Mapping((), entry.key.span)
-    if isinstance(node.value, str) and node.value.strip().endswith(_FILES):
+    if isinstance(node.value, str) and node.value.strip().endswith(DATA_FILES):
         refuse(info, node, "a weight or a mapping", f"write {{matrix: {{file: {shorten(node.value.strip())}}}}}")
     parts = apart(node.value) if isinstance(node.value, str) else None
     if parts is not None and parts.key in ConnectionModel.model_fields:

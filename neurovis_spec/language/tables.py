@@ -61,7 +61,7 @@ class FileReference(NamedTuple):
 
 
 #: How the names of files end that hold a table of numbers.
-DATA_FILES: Final = (".csv", ".npy", ".npz", ".mtx")
+DATA_FILES: Final = (".csv", ".tsv", ".txt", ".dat", ".npy", ".npz", ".mtx")
 #: How those of text end whose cells something separates.
 TEXT_FILES: Final = (".csv", ".tsv", ".txt", ".dat")
 #: How those end whose columns have names.

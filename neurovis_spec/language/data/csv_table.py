@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.data.cells import (
+    COMMAS,
     NO_COMMENT,
     PLAIN,
     Row,
@@ -29,10 +30,11 @@ from neurovis_spec.language.data.cells import (
     numbers_of,
     rows_of,
     separated,
+    separator_of,
     strip_end,
     text_of,
 )
-from neurovis_spec.language.data.table import CellError, Faults, Room, Table, check_cells
+from neurovis_spec.language.data.table import CellError, Faults, Room, Table, check_cells, in_row
 
 #: cells of a row among which one that is invalid is searched
 _FEW: Final = 1 << 10
@@ -73,6 +75,19 @@ def parse_numbers(data: bytes, room: Room | None = None) -> Table:
     table = values[:filled].reshape(-1, width)
     numbered = header is None and numbers_columns(data, table)
     return Table(table, ~np.isnan(table), header, numbered)
+
+
+def parse_separated(data: bytes, path: str, room: Room | None = None) -> Table:
+    """The same of a file whose cells something else than commas may separate. Raises CellError."""
+    separator = separator_of([data], path) if data else COMMAS
+    if separator == COMMAS:
+        return parse_numbers(data, room)
+    for number, lines in below(text_of([data], separator), 0):
+        if b"," in lines:
+            row = number + lines.count(b"\n", 0, lines.index(b","))
+            raise in_row(row, f"has a comma, and {separator.noun} separate its cells", "numbers have a decimal point")
+    parts = (lines.replace(separator.byte, b",") for lines in text_of([data], separator))
+    return parse_numbers(b"\n".join(parts), room)
 
 
 def _header(row: Row) -> tuple[str, ...] | None:

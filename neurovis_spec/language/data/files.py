@@ -186,6 +186,10 @@ def _parsed(suffix: str, data: bytes, key: str | None, room: Room | None) -> Tab
         from neurovis_spec.language.data.csv_table import parse_numbers
 
         return parse_numbers(data, room)
+    if suffix in TEXT_FILES:
+        from neurovis_spec.language.data.csv_table import parse_separated
+
+        return parse_separated(data, suffix, room)
     if suffix == ".npy":
         from neurovis_spec.language.data.npy import parse_npy
 
