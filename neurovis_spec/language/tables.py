@@ -10,7 +10,7 @@ from typing import Annotated, Final, NamedTuple, TypeGuard
 
 from pydantic import TypeAdapter, ValidationError, ValidationInfo
 
-from neurovis_spec.diagnostics import Findings, Span, shorten
+from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.grammar import (
     CELL,
     FORMULA,
@@ -409,14 +409,3 @@ def columns_of_edges(settings: Mapping) -> tuple[Located[str], ...]:
     """The columns of edges that settings name."""
     found = (entry.value.get("column") for entry in settings.entries if isinstance(entry.value, Mapping))
     return tuple(Located(one.value, one) for one in found if isinstance(one, Scalar) and isinstance(one.value, str))
-
-
-def told(where: tuple[Condition, ...]) -> str:
-    """A condition in words, as a finding or a table shows it.
-
-    >>> told(())
-    ''
-    """
-    return ", ".join(
-        f"{shorten(one.column.value)}: {', '.join(str(value.value) for value in one.values)}" for one in where
-    )
