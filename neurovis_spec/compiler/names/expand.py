@@ -142,13 +142,7 @@ class Expander:
             self._check_size(scope)
         if not section.instances:
             return index
-        by_name: dict[str, tuple[int, ...] | Unknown] = {}
-        of_tables: set[str] = set()  # their names are known from here alone, to whoever compares them
-        for name, model in section.instances.items():
-            made = self._instances(name, model, scope, (*ancestors, index))
-            by_name.update({one: places for one, places in made.items() if one not in of_tables})
-            if isinstance(model.names, TableColumn):
-                of_tables.update(made)
+        by_name = self._children(section, scope, (*ancestors, index))
         children = names_of(section, "instances", by_name)
         inner = {  # inputs of a single instance are also seen from here, as INSTANCE.INPUT
             f"{name}.{key}": its_input
@@ -158,6 +152,19 @@ class Expander:
         }
         self.scopes[index] = replace(scope, children=children, inputs=Names({**inputs, **inner}, inputs.is_open))
         return index
+
+    def _children(
+        self, section: Section, scope: Scope, ancestors: tuple[int, ...]
+    ) -> dict[str, tuple[int, ...] | Unknown]:
+        """Make the scopes of the instances in a section; their indices by name."""
+        by_name: dict[str, tuple[int, ...] | Unknown] = {}
+        of_tables: set[str] = set()  # their names are known from here alone, to whoever compares them
+        for name, model in section.instances.items():
+            made = self._instances(name, model, scope, ancestors)
+            by_name.update({one: places for one, places in made.items() if one not in of_tables})
+            if isinstance(model.names, TableColumn):
+                of_tables.update(made)
+        return by_name
 
     def _check_size(self, scope: Scope) -> None:
         """Refuse more instances, or neurons, than there may be before any of them is made. Modules that are checked

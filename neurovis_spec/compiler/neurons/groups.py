@@ -189,22 +189,7 @@ class Builder:
         if names is UNKNOWN or n is UNKNOWN:
             return UNKNOWN
         labels = self._labels(model, names, table)
-        group = Group(
-            name=self.scope.called(name),
-            start=start,
-            count=n,
-            activation=kind.activation.definition.name,
-            model=kind.model.definition.name,
-            combine=value_or(model.combine, "sum"),
-            activation_parameters=_numbers(kind.activation.parameters),
-            model_parameters=_numbers(kind.model.parameters),
-            input=self._input_name(model),
-            box=self.scope.called(model.box.value) if isinstance(model.box, Located) else None,
-            role=None if model.role is None else model.role.value,
-            description=value_or(model.description, None),
-            module=self.scope.module,
-            spikes=_spikes(kind),
-        )
+        group = self._described(name, model, kind, start, n)
         return Built(
             name=name,
             group=group,
@@ -224,6 +209,25 @@ class Builder:
             parts=(*kind.parts, *bias_parts, *position_parts),
             port_bias=biases,
             port_input=inputs,
+        )
+
+    def _described(self, name: str, model: GroupModel, kind: NeuronType, start: int, n: int) -> Group:
+        """What the network knows of a group as such."""
+        return Group(
+            name=self.scope.called(name),
+            start=start,
+            count=n,
+            activation=kind.activation.definition.name,
+            model=kind.model.definition.name,
+            combine=value_or(model.combine, "sum"),
+            activation_parameters=_numbers(kind.activation.parameters),
+            model_parameters=_numbers(kind.model.parameters),
+            input=self._input_name(model),
+            box=self.scope.called(model.box.value) if isinstance(model.box, Located) else None,
+            role=None if model.role is None else model.role.value,
+            description=value_or(model.description, None),
+            module=self.scope.module,
+            spikes=_spikes(kind),
         )
 
     def _at_ports(
