@@ -98,6 +98,8 @@ class _Integration:
         #: those that are 0 where members rest, and of which else a number says it
         self.resting = {one.key: found for one in self.plan.states if (found := self.rest(one)) is not None}
         self.varying = {one.key: one.varies and one.key not in self.resting for one in self.plan.states}
+        #: those of which what else moves says it, in loops: both are chosen behind that
+        self.pausing = {one.key: found for one in self.plan.states if (found := self.pause(one)) is not None}
         #: what formulas of connections see at a stage
         self.sight = _StageSight(step.sight.ends, self.code, step.form, plan=self.plan)
         self.forming = Forming(self.sight, {one.number: one.signal for one in self.plan.contacts})
@@ -108,9 +110,21 @@ class _Integration:
             return None
         let, parameters = one.part.slopes.let, self.code.parameters(one.use, "p")
         read = unfolded(let, [found[1].otherwise]).names - {name for name, _ in let}
-        if not names(found[0].condition) <= {*one.use.parameters, *(state.name for state in one.use.definition.state)}:
+        if not self.asks_itself(one, found[0]):
             return None
         return found if all(isinstance(parameters.get(name), float) for name in read) else None
+
+    def pause(self, one: FlowState) -> tuple[Conditional, Conditional] | None:
+        """``FlowState.resting`` of a state in a loop whose slope varies."""
+        if self.method not in _CHANGES or self.step.form.written_out or not self.varying[one.key]:
+            return None
+        found = one.resting
+        return found if found is not None and self.asks_itself(one, found[0]) else None
+
+    def asks_itself(self, one: FlowState, chosen: Conditional) -> bool:
+        """Whether a condition reads nothing but states and parameters of the member."""
+        own = {*one.use.parameters, *(state.name for state in one.use.definition.state)}
+        return names(chosen.condition) <= own
 
     def write(self) -> None:
         """All of it."""
@@ -439,11 +453,14 @@ class _Integration:
         code, changes = self.code, _CHANGES.get(self.method)
         use = part.population.model if isinstance(part, Part) else part.projection.use
         diagonal = dict(part.slopes.trees)
+        pausing = {name: self.pausing[key] for name in diagonal if (key := Key(use.owner, name)) in self.pausing}
+        diagonal |= {name: slope.otherwise for name, (_, slope) in pausing.items()}
         more = tuple((name, tree) for name, tree in part.slopes.let if name not in known)
         known = self.step.let(more, known, [*diagonal.values()], functions)
         through = self.through(part, place, known, functions) if isinstance(part, Part) else {}
         for name, tree in part.derivatives.trees:
             key = Key(use.owner, name)
+            tree = pausing[name][0].otherwise if name in pausing else tree
             idle, at = self.idle(part, name, place), plus(self.plan.starts[key], place)
             slope = self.change_or_rest(key, use, place, known, functions)
             slope = code.value(tree, known, functions) if slope is None else slope
@@ -484,17 +501,17 @@ class _Integration:
         """What members that rest change by is 0: in a loop of its own, for compilers make vectors of a choice between
         numbers that are there, and not of one with a division in it."""
         owner = part.population.model.owner
-        held = [name for name in part.flows if Key(owner, name) in self.resting]
-        if not held or self.step.form.written_out:
+        keys = [key for name in part.flows if (key := Key(owner, name)) in self.resting or key in self.pausing]
+        if not keys or self.step.form.written_out:
             return
 
         def rest(place: Place, totals: Mapping[int, str]) -> None:
-            for name in held:
-                key = Key(owner, name)
-                at, (derivative, _) = plus(self.plan.starts[key], place), self.resting[key]
+            for key in keys:
+                (derivative, _), at = self.resting.get(key) or self.pausing[key], plus(self.plan.starts[key], place)
                 chosen = Conditional(derivative.condition, Number(0.0), Name("it moves"))
-                known = {**self.known(part, place), "it moves": f"fk[{at}]"}
-                self.code.line(f"fk[{at}] = {self.code.text(self.code.value(chosen, known))};")
+                for array in ("fj", "fk") if key in self.pausing else ("fk",):
+                    known = {**self.known(part, place), "it moves": f"{array}[{at}]"}
+                    self.code.line(f"{array}[{at}] = {self.code.text(self.code.value(chosen, known))};")
 
         self.step.each(len(part.population.members), {}, rest)
 
