@@ -347,3 +347,18 @@ def test_all_states_tell_who_is_armed_and_how_long_who_rests() -> None:
         behind[:] = [3, 2, 1][: len(behind)]
     assert rests.tolist() == expected.tolist()
     assert {"K1.is armed", "K1.rests for"} <= set(run.state_names)
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
+def test_who_fires_is_held_at_whole_spikes(backend: str) -> None:
+    """Of a neuron whose activity is its potential, as of one whose activity is the spike."""
+    text = """\
+neurovis: 1
+name: held
+time: {dt: 0.1 ms}
+models: {cell: {time: ms, state: {v: {derivative: -v/20}}, spike: {when: v >= 1, set: {v: 0}}, activity: v}}
+neurons: {A: {model: cell}, B: {}}
+connections: {A -> B: {send: spike, weight: 2}}
+events: [{from: 2, to: 4, clamp: {A.spike: 0.5}}]
+"""
+    assert nv.compile_text(text).run(7, backend=backend)["B"].tolist() == [0, 0, 0, 2, 2, 0, 0]

@@ -659,6 +659,18 @@ class Network:
         return self.spikes[: len(self.neurons)]
 
     @cached_property
+    def held_as_spikes(self) -> BoolArray:
+        """For all that can be clamped (``state_places``) whether it is a spike, which is held as 1 where it is not held
+        at 0: activities that are one, and the states that say who fires."""
+        result = np.zeros(self.clampable, dtype=np.bool_)
+        result[: len(self.neurons)] = self.spiking
+        for holder, use in self.uses:
+            place = self.state_places.get(Key(use.owner, SPIKE))
+            if use.definition.fires and place is not None:
+                result[place : place + len(holder.members)] = True
+        return result
+
+    @cached_property
     def clampable_of_neurons(self) -> int:
         """How many numbers of neurons can be clamped: activities, then states of models."""
         return len(self.neurons) + _holdable_in(self.populations)

@@ -478,8 +478,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             with code.block(f"if (state->phase == {number})" if switch else ""):
                 for clamp in sorted(set(order[order >= 0].tolist())):
                     value = code.text(formula(code, phase.clamps[clamp].value, 0))
-                    held, fires = order == clamp, np.zeros(len(order), dtype=np.bool_)
-                    fires[: len(self.network.spiking)] = self.network.spiking
+                    held, fires = order == clamp, self.network.held_as_spikes
                     self._hold_at(code, np.flatnonzero(held & ~fires), value)
                     self._hold_at(code, np.flatnonzero(held & fires), f"({value}) != 0")
                 if phase.lesioned.any():

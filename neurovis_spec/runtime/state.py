@@ -137,7 +137,7 @@ def first_conditions(network: Network) -> Conditions:
         parameters=settable.parameters.copy(),
         was_set=np.zeros(len(settable.slots), dtype=np.bool_),
         variables=settable.initial.copy(),
-        held=Held.none(network.clampable, network.spiking),
+        held=Held.none(network.held_as_spikes),
         lesioned_neurons=np.zeros(n, dtype=np.bool_),
         lesioned_connections=np.zeros(m, dtype=np.bool_),
         paused=np.zeros(m, dtype=np.bool_),

@@ -54,9 +54,9 @@ class Change(NamedTuple):
 @dataclass
 class Held:
     """The clamps that hold at a step: ``order`` is that of the clamp which holds a neuron or a state, −1 where none
-    does, and ``value`` what it is held at, both for all that can be clamped, neurons first. An activity that is a
-    spike (``spiking``) is held at 1 where it is not 0. ``active`` are all that have not ended, by their order. What a
-    formula says is computed ``by`` a library."""
+    does, and ``value`` what it is held at, both for all that can be clamped, neurons first. What is a spike
+    (``spiking``) is held at 1 where it is not 0. ``active`` are all that have not ended, by their order. What a formula
+    says is computed ``by`` a library."""
 
     order: IntArray
     value: FloatArray
@@ -64,10 +64,9 @@ class Held:
     spiking: BoolArray
 
     @classmethod
-    def none(cls, count: int, spiking: BoolArray) -> Held:
-        """No clamp, of so many neurons and states. ``spiking`` says of each neuron whether its activity is a spike."""
-        states = np.zeros(count - len(spiking), dtype=np.bool_)
-        return cls(np.full(count, -1, dtype=np.int64), np.zeros(count), {}, np.concatenate((spiking, states)))
+    def none(cls, spiking: BoolArray) -> Held:
+        """No clamp, of all neurons and states; ``spiking`` says of each whether it is a spike."""
+        return cls(np.full(len(spiking), -1, dtype=np.int64), np.zeros(len(spiking)), {}, spiking)
 
     def copy(self) -> Held:
         """The same, of its own."""

@@ -156,7 +156,7 @@ class _TrialRun:
         self._was_set = np.zeros(len(settable.slots), dtype=np.bool_)
         self._weights = self.network.connections.weights.whole().copy()
         self._variables = settable.initial.copy()
-        self._held = Held.none(self.network.clampable, self.network.spiking)
+        self._held = Held.none(self.network.held_as_spikes)
         self._arrays: dict[tuple[Binding, ...], tuple[_WrittenArray, ...]] = {}
         #: the slots that events alone set, and those of them that say what inputs are fed
         end = len(settable.slots) if settable.of_events is None else settable.of_events
