@@ -32,6 +32,8 @@ _FIRST_ROOM: Final = 1 << 10
 _MASKS: Final = np.array([(1 << 8 * size) - 1 for size in range(9)], dtype=np.uint64)
 #: odd numbers that spread words over places (the golden ratio's, as in Knuth 6.4, and powers of it)
 _SPREAD: Final = [np.uint64(pow(0x9E3779B97F4A7C15, power, 1 << 64)) for power in range(1, _WORDS + 1)]
+#: spellings of a column that are compared one by one
+_FEW: Final = 8
 #: texts of a column that are compared with one that it has not
 _COMPARED: Final = 1000
 #: columns that are named where one is not found
@@ -197,15 +199,45 @@ class Picked:
         self._names = Names()
         #: of the text of each number whether it is one of the values; the last is that of an empty cell
         self._taken = np.array([_takes(condition, "")])
+        #: of a few spellings, as words, whether they are taken
+        self._spellings: dict[tuple[int, ...], bool] = {}
 
     def of(self, cells: Cells) -> BoolArray:
         """Which of the rows with these cells in the column."""
+        quick = self._by_spelling(cells)
+        if quick is not None:
+            return quick
         numbers = self._names.of(cells)
         new = self._names.known[len(self._taken) - 1 :]
         if new:
             found = [_takes(self._condition, text) for text in new]
             self._taken = np.concatenate((self._taken[:-1], found, self._taken[-1:]))
-        return self._taken[numbers]
+        taken = self._taken[numbers]
+        self._learn(cells, numbers, taken)
+        return taken
+
+    def _by_spelling(self, cells: Cells) -> BoolArray | None:
+        """The same by the few spellings that were seen before; None where a cell has another one."""
+        if not self._spellings or not len(cells.begins) or (cells.ends - cells.begins).max() > 8 * _WORDS:
+            return None
+        words = cells.words()
+        taken, known = np.zeros(len(cells.begins), dtype=np.bool_), np.zeros(len(cells.begins), dtype=np.bool_)
+        for spelling, takes in self._spellings.items():
+            if not any(spelling[len(words) :]):
+                here = np.logical_and.reduce([word == held for word, held in zip(words, spelling, strict=False)])
+                known |= here
+                taken |= here & takes
+        return taken if known.all() else None
+
+    def _learn(self, cells: Cells, numbers: npt.NDArray[np.int32], taken: BoolArray) -> None:
+        """Remember how texts are spelled, as long as these are few."""
+        found = dict(zip(numbers.tolist(), range(len(numbers)), strict=True))
+        if len(found) + len(self._spellings) > _FEW or (cells.ends - cells.begins).max(initial=0) > 8 * _WORDS:
+            return
+        words = cells.words() if found else []
+        for row in found.values():
+            spelling = [int(word[row]) for word in words]
+            self._spellings[(*spelling, *[0] * (_WORDS - len(spelling)))] = bool(taken[row])
 
     def takes(self, cell: str) -> bool:
         """Whether a row with this cell in the column."""
