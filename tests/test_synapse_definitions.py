@@ -79,12 +79,16 @@ NO_ATTRIBUTES = ("no-attributes", "there are no attributes in an expression", "r
         "activations: {m: {value: x*post.v}}\nneurons: {A: {}}",
         "inputs: {s: {expression: pre.v}}\nneurons: {A: {}}",
         "parameters: {p: pre.v}\nneurons: {A: {}}",
-        "neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: {weight: pre.v}}",
         "neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: {plasticity: {hebbian: {rate: pre.v}}}}",
     ],
 )
 def test_elsewhere_a_point_is_answered_as_ever(text: str) -> None:
     assert answer(text) == NO_ATTRIBUTES
+
+
+def test_a_weight_reads_parameters_of_the_ends_alone() -> None:
+    code, message, _ = answer("neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: {weight: pre.v}}")
+    assert (code, message) == ("unknown-name", "the model 'static' of 'A' has no parameter 'v'")
 
 
 def test_a_group_may_be_called_pre() -> None:
