@@ -354,6 +354,7 @@ class CompiledNetwork(Compilation):
         """Write tables of neurons and edges, none of them over a file that the spec reads. Raises ExportError,
         OSError."""
         from neurovis_spec.language.tables import EdgeFile
+        from neurovis_spec.real_paths import real_path
         from neurovis_spec.runtime.c_settable import ExportError
         from neurovis_spec.runtime.csv_tables import EdgeNames, csv_tables
         from neurovis_spec.runtime.files import replacing
@@ -363,9 +364,9 @@ class CompiledNetwork(Compilation):
         weights = self.network.connections.weights.whole() if state is None else state.weights
         texts = csv_tables(self.network, weights, names)
         paths = {folder / name: text for name, text in texts.items()}
-        read = {path.resolve() for path in self.files}
+        read = {real_path(path) for path in self.files}
         for path in paths:
-            if path.resolve() in read:
+            if real_path(path) in read:
                 raise ExportError(f"{path} is a file that the spec reads, which would be lost: name another folder")
         folder.mkdir(parents=True, exist_ok=True)
         for path, text in paths.items():

@@ -84,6 +84,7 @@ def test_swish_is_what_it_says() -> None:
 
 DEFAULTS = {
     "identity": {}, "tanh": {}, "sigmoid": {}, "relu": {}, "leaky_relu": {"slope": 0.01}, "softplus": {},
+    "softmax": {"gain": 1},
     "step": {"threshold": 0}, "sign": {}, "sin": {}, "cos": {}, "gaussian": {"sigma": 1},
     "clip": {"low": -1, "high": 1}, "piecewise_linear": {"x0": -1, "y0": -1, "x1": 1, "y1": 1},
     "static": {}, "leaky_integrator": {"leak": 0.1}, "adaptive": {"leak": 0.1, "strength": 1, "rate": 0.01},

@@ -79,7 +79,6 @@ def test_where_a_number_is_drawn_once_it_may_hold_normal_and_uniform() -> None:
     for elsewhere in (
         f"neurons: {{A: {{count: {draw}}}}}",
         f"neurons: {{A: {{count: 2, first: {draw}}}}}",
-        f"neurons: {{A: {{position: [{draw}, 0]}}}}",
         f"neurons: {{A: {{activation: {{gaussian: {{sigma: {draw}}}}}}}}}",
         f"neurons: {{A: {{model: {{leaky_integrator: {{leak: {draw}}}}}}}}}",
         f"neurons: {{A: {{}}}}\nconnections: {{A -> A: {{plasticity: {{hebbian: {{rate: {draw}}}}}}}}}",

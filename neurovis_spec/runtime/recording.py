@@ -353,7 +353,7 @@ class Recording:
 
     def _matrix(self, name: str) -> FloatArray:
         arrow = parse(name)
-        if not isinstance(arrow, Arrow):
+        if not isinstance(arrow, Arrow) or arrow.normal in self.connection_index:
             raise unknown("connection", name, self.connection_names)
         places = [np.full(len(self.neurons), -1, dtype=np.int64) for _ in range(2)]
         for end, place in zip((arrow.sources, arrow.targets), places, strict=True):

@@ -52,12 +52,17 @@ def positions_of(
 
 def _from_file(reference: FileReference, n: int | Unknown, findings: Findings, files: Files) -> FloatArray | Unknown:
     """The positions in a file, a row of x and y, perhaps z, for each neuron."""
-    table = files.table(reference, None if n is UNKNOWN else (n, _LEAST), full=_NUMBERS)
+    table = files.table(reference, None if n is UNKNOWN else (n, _MOST))
     if table is UNKNOWN or n is UNKNOWN:
         return UNKNOWN
     rows, columns = table.values.shape
     if rows == n and _LEAST <= columns <= _MOST:
-        return np.array(table.values, dtype=np.float64)
+        gap = next(table.gaps(), None)
+        if gap is None:
+            return np.array(table.values, dtype=np.float64)
+        message = f"row {gap[0]}, column {gap[1]} of the file is empty; {_NUMBERS}"
+        findings.error("file-format", reference.path.span, message)
+        return UNKNOWN
     wanted = f"positions of {plural(n, 'neuron')} are {plural(n, 'row')} of 2 or 3 numbers"
     findings.error("wrong-size", reference.path.span, f"{wanted}; the file has {rows} × {columns}")
     return UNKNOWN
@@ -70,7 +75,7 @@ def _from_rows(node: AnyList, n: int | Unknown, constants: Constants, stream: St
     if n is not UNKNOWN and not one and len(node) != n:
         if len(node) <= _MOST and all(isinstance(item, Scalar) for item in node.items):
             message = f"{_NUMBERS}, and here are {plural(n, 'neuron')}"
-            findings.error("wrong-type", node.span, message, "write a list of positions, [[x, y], [x, y], …]")
+            findings.error("wrong-size", node.span, message, "write a list of positions, [[x, y], [x, y], …]")
             return UNKNOWN
         findings.error("wrong-size", node.span, f"{plural(len(node), 'position')} for {plural(n, 'neuron')}")
         return UNKNOWN
