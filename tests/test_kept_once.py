@@ -211,6 +211,28 @@ def test_runs_in_pieces_are_those_of_the_reference(events: str, delay: str, rule
 
 @pytest.mark.compiler
 @pytest.mark.usefixtures("loops")
+def test_what_brings_a_signal_that_steps_change_is_held_as_ever() -> None:
+    """An activity that reads it is taken at a stage as the step before has left it, by rules that see it."""
+    text = TRACES[: TRACES.index("rules:")].replace(
+        "models:",
+        """models:
+  sum: {time: ms, ports: [p], state: {v: {initial: 0.3, derivative: (drive - v)/7}}, activity: v + p}""",
+    )
+    text += """
+rules: {seen: {time: ms, state: {d: {derivative: 0.3*(post - d)}}, weight: {each_step: weight + 0.01*d}}}
+synapses: {fading: {state: {g: {each_step: 0.8*g, on_pre: g + 1}}, signal: g*weight}}
+neurons: {A: {count: 3, model: cell, bias: 2}, B: {count: 2, model: sum, bias: 1}}
+connections:
+  A -> B: {weight: 0.3, pattern: all_to_all, synapse: fading, port: p, delay: 1}
+  B -> B: {weight: 0.2, pattern: all_to_all, delay: 1, plasticity: seen}
+"""
+    network = nv.compile_text(text.replace("METHOD", "rk4")).network
+    assert set(kept(network).values()) == {3}
+    agree(network)
+
+
+@pytest.mark.compiler
+@pytest.mark.usefixtures("loops")
 def test_weights_of_a_state_that_somebody_has_changed_count() -> None:
     text = TRACES[: TRACES.index("  A -> B")] + "  A -> A: {weight: 0.1, pattern: all_to_all, synapse: fading}\n"
     network = nv.compile_text(text.replace("METHOD", "heun")).network

@@ -126,6 +126,8 @@ class Plan:
     operation: Integrate
     #: whether noise is added behind it
     diffuses: bool
+    #: the network before states of it were kept once, which says what flows: a signal of one that steps change is held
+    whole: Network
 
     @cached_property
     def of_stage(self) -> tuple[Part, ...]:
@@ -207,7 +209,7 @@ class Plan:
     @cached_property
     def flows(self) -> BoolArray:
         """Which activities and outlets flow."""
-        return flowing(self.network)
+        return flowing(self.whole)
 
     @cached_property
     def count(self) -> int:
@@ -328,12 +330,12 @@ class Plan:
         return starts | {"": start}
 
 
-def plan_of(network: Network) -> Plan | None:
-    """The plan of a network; None where nothing flows."""
+def plan_of(network: Network, whole: Network | None = None) -> Plan | None:
+    """The plan of a network, which may be what keeps states of a ``whole`` once; None where nothing flows."""
     by = network.integration
     if by is None:
         return None
-    return Plan(network, by, any(isinstance(one, Diffuse) for one in network.program))
+    return Plan(network, by, any(isinstance(one, Diffuse) for one in network.program), whole or network)
 
 
 def work_size(plan: Plan | None) -> int:

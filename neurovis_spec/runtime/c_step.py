@@ -89,7 +89,7 @@ class Built:
     @cached_property
     def plan(self) -> Plan | None:
         """What is integrated."""
-        return plan_of(self.network)
+        return plan_of(self.network, None if self.whole is None else self.whole.network)
 
     @cached_property
     def in_work(self) -> bool:
