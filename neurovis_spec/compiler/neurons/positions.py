@@ -52,7 +52,7 @@ def positions_of(
 
 def _from_file(reference: FileReference, n: int | Unknown, findings: Findings, files: Files) -> FloatArray | Unknown:
     """The positions in a file, a row of x and y, perhaps z, for each neuron."""
-    table = files.table(reference, None if n is UNKNOWN else (n, _MOST))
+    table = files.table(reference, None if n is UNKNOWN else (n, _LEAST))
     if table is UNKNOWN or n is UNKNOWN:
         return UNKNOWN
     rows, columns = table.values.shape
