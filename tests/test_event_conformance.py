@@ -312,3 +312,18 @@ def test_symmetric_connections_have_one_weight_in_both_directions() -> None:
         3,
         3,
     ]
+
+
+def test_a_trial_keeps_what_tied_weights_have_learned() -> None:
+    """The weights of both entries stay one set of numbers."""
+    back = "  K -> A: {weight: {transpose: A -> K}, delay: 1}\n"
+    network = compiled(LEARNING + back)
+    first = network.run(5)
+    simulator = network.simulator()
+    for _ in range(5):
+        simulator.step()
+    simulator.reset(keep="weights")
+    second = network.run(1, start=first, only="weights")
+    for weights in (simulator.connection_weights, second.all_weights(0)):
+        found = {name: weights[index] for name, index in network.network.connection_index.items()}
+        assert found["A2 -> K3"] == found["K3 -> A2"] != 0.3

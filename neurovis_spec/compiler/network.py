@@ -699,12 +699,19 @@ class Network:
     def changing(self) -> IntArray:
         """Indices of the connections whose weight can change in a run, by a rule or by an event (reached or not)."""
         can = np.zeros(len(self.connections), dtype=np.bool_)
-        for one in self.projections:
-            if one.kind == RULE and not one.use.definition.moves_centre:
-                can[one.members] = True
+        can[self.learned] = True
         for binding in self.set_by_events:
             if binding.weights:
                 can[binding.indices] = True
+        return frozen(self.connections.with_tied(np.flatnonzero(can).astype(np.int64))[0])
+
+    @cached_property
+    def learned(self) -> IntArray:
+        """Indices of the connections whose weight a rule changes, their own or, where weights are tied, another's."""
+        can = np.zeros(len(self.connections), dtype=np.bool_)
+        for one in self.projections:
+            if one.kind == RULE and not one.use.definition.moves_centre:
+                can[one.members] = True
         return frozen(self.connections.with_tied(np.flatnonzero(can).astype(np.int64))[0])
 
     @cached_property

@@ -14,7 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import CENTRE, RULE, Holder, Key, Population, Use
+from neurovis_spec.compiler.program import CENTRE, Holder, Key, Population, Use
 from neurovis_spec.runtime.lags import lags_of
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.stages import taken_by
@@ -150,21 +150,11 @@ class Beginnings:
                         state.outlets[places] = first.outlets[places]
 
 
-def learning(network: Network) -> BoolArray:
-    """The connections (m,) whose weight a rule changes."""
-    result = np.zeros(len(network.connections), dtype=np.bool_)
-    for one in network.projections:
-        if one.kind == RULE and not one.use.definition.moves_centre:
-            result[one.members] = True
-    return result
-
-
 def new_trial(network: Network, begin: State, now: State) -> State:
     """The state in which a run begins, but with the weights and centres that have been learned ``now``; random numbers
     go on behind the steps that were made."""
     state = begin.copy()
-    learned = learning(network)
-    state.weights[learned] = now.weights[learned]
+    state.weights[network.learned] = now.weights[network.learned]
     for holder, use in network.uses:
         if use.definition.moves_centre and len(holder.members):
             state.cells[use.owner][CENTRE][:] = now.cells[use.owner][CENTRE]

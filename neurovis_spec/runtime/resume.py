@@ -30,7 +30,6 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Holder, Key, Population, Quantity, Use
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
-from neurovis_spec.runtime.beginning import learning
 from neurovis_spec.runtime.controls import Controls, lose
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import of_table
@@ -91,9 +90,9 @@ def learned_state(network: Network, recording: Recording, functions: Library = N
     parameters and lesions are those of the beginning, random numbers go on. Raises RecordingError."""
     (of_table(recording, network) or recording).check_whole("a run cannot go on from")
     _matching_neurons(network, recording)
-    state, learns = initial_state(network), learning(network)
+    state = initial_state(network)
     columns, places = _learned_weights(network, recording)
-    kept = learns[places]
+    kept = np.isin(places, network.learned)
     state.weights[places[kept]] = recording.weights_after[columns[kept]]
     state.drawn = recording.reached
     return state
