@@ -75,6 +75,8 @@ class InputReader:
             for name, first in network.settable.feeds.items()
             if name not in self._supplied
         }
+        #: the inputs that are fed by events now
+        self.fed: frozenset[str] = frozenset()
         read = (*(entry.slots for entry in network.inputs), *(noise.slots for noise in network.noises))
         #: the slots (indices of parameters) that formulas read, and feeds
         self._read = sorted({slot for slots in read for slot in slots.values()}.union(*self._feeds.values()))
@@ -121,11 +123,6 @@ class InputReader:
             self._left_beside = frozenset(given), self.left.difference(given)
         return self._left_beside[1]
 
-    @property
-    def fed(self) -> frozenset[str]:
-        """The inputs that are fed by events now."""
-        return frozenset(name for name, slots in self._feeds.items() if self._parameters[slots[0]])
-
     def use(self, state: State) -> None:
         """Take parameters as a state has them by now; what depends on those that have changed is made anew."""
         now = state.conditions
@@ -136,6 +133,7 @@ class InputReader:
             or any(old[slot] != now.parameters[slot] for slot in self._read)
         ):
             self._drawn_before = state.drawn
+            self.fed = frozenset(name for name, slots in self._feeds.items() if self._parameters[slots[0]])
             self._first, self._rows = -1, self._rows[:0]
             self._expressions.clear()
 
@@ -178,11 +176,11 @@ class InputReader:
         if self.left or self.all_left:  # by functions that give the same bits whatever stands beside a number
             count = min(self._most, -(-(stop - first) // count) * count)
         steps = np.arange(first, first + count)
-        rows, fed = np.zeros((count, self.network.vector_size)), self.fed
+        rows = np.zeros((count, self.network.vector_size))
         for entry in self.network.inputs:
             if entry.name not in self.left:
                 rows[:, entry.start : entry.start + entry.size] = self._source(entry, steps)
-            if (entry.name in self._supplied or entry.name in fed) and entry.name in self.network.held_inputs:
+            if (entry.name in self._supplied or entry.name in self.fed) and entry.name in self.network.held_inputs:
                 rows[:, self.network.held_inputs[entry.name]] = 1.0
         for noise in self.network.noises:
             rows[:, noise.start : noise.start + len(noise.members)] = self._noise(noise, noise.expression, steps)
@@ -210,7 +208,7 @@ class InputReader:
         return hidden
 
     def _source(self, entry: Input, steps: npt.NDArray[np.int64]) -> FloatArray | float:
-        if entry.name in self._feeds and self._parameters[self._feeds[entry.name][0]]:
+        if entry.name in self.fed:
             values = self._parameters[self._feeds[entry.name][1:]]
             return np.broadcast_to(values, (len(steps), entry.size))
         table = self._supplied.get(entry.name, self._table(entry))

@@ -329,6 +329,9 @@ class Meter:
         self.made = 0
         self._running = [running(window.summary, window.last) for window in measure.formula.windows]
         self._constants = constants(measure.dt)
+        several = {*measure.groups, *measure.state_groups}
+        #: of each window whether it is of the neurons of a group, or of their states
+        self._grouped = [not several.isdisjoint(names(window.tree)) for window in measure.formula.windows]
         #: the value of each window after the last step
         self.values: list[float] = [math.nan] * len(self._running)
 
@@ -357,7 +360,7 @@ class Meter:
         for number, one in enumerate(self.measure.formula.counts):
             known[COUNTED(number)] = float(self._across("count", one.tree, known, activity[None], states[None])[0])
         for number, window in enumerate(self.measure.formula.windows):
-            if self._grouped(window.tree):
+            if self._grouped[number]:
                 now = float(self._across(window.summary, window.tree, known, activity[None], states[None])[0])
             else:
                 now = evaluate(window.tree, known)
@@ -374,10 +377,6 @@ class Meter:
         fired = np.count_nonzero(activity[:, neurons], axis=1) + np.count_nonzero(states[:, heard], axis=1)
         result: FloatArray = fired / ((len(neurons) + len(columns)) * self.measure.dt)
         return result
-
-    def _grouped(self, tree: Tree) -> bool:
-        """Whether a formula is of the neurons of a group, or of their states."""
-        return not {*self.measure.groups, *self.measure.state_groups}.isdisjoint(names(tree))
 
     def _across(
         self,
@@ -418,7 +417,7 @@ class Meter:
         for number, one in enumerate(self.measure.formula.counts):
             known[COUNTED(number)] = self._across("count", one.tree, known, activity, states)
         for number, window in enumerate(self.measure.formula.windows):
-            if self._grouped(window.tree):
+            if self._grouped[number]:
                 now = self._across(window.summary, window.tree, known, activity, states)
             else:
                 now = _broadcast(window.tree, known, count)

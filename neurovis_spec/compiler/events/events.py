@@ -102,7 +102,8 @@ class EventReader:
             message = f"the clamp ends before it begins: from {at} to {to}, which is exclusive"
             self.findings.error("out-of-range", model.to.span, message)
         given, weights = self._set(model)
-        feeds = [one for name in names_of(model, "feed", model.feed) for one in self._feed(model, name)]
+        fed: Mapping[str, Formula | FormulaList | Unknown | None] = names_of(model, "feed", model.feed)
+        feeds = [one for name, value in fed.items() for one in self._feed(key_of(model.source, "feed", name), value)]
         named = names_of(model, "clamp", model.clamp)
         clamps = [one for name, formula in named.items() for one in self._clamp(model, name, formula)]
         lesioned_neurons, lesioned_connections = self._neurons_and_connections(model.lesion)
@@ -164,9 +165,9 @@ class EventReader:
             return []
         return [SetWeights(key.value, members, value, key.span)]
 
-    def _feed(self, model: EventModel, name: str) -> list[Feed]:
+    def _feed(self, key: Located[str], value: Formula | FormulaList | Unknown | None) -> list[Feed]:
         """What a key of ``feed`` names, and what that is fed; nothing where either is invalid."""
-        key, value = key_of(model.source, "feed", name), names_of(model, "feed", model.feed)[name]
+        name = key.value
         entry = self.inputs.get(name)
         if entry is None:
             message = f"there is no input '{shorten(name)}' to be fed"
