@@ -73,10 +73,17 @@ class Beginnings:
 
     network: Network
     _known: State | None = field_of(default=None, repr=False)
+    _rewinds: dict[bytes, Rewind] = field_of(default_factory=dict, repr=False)
 
     def rewind(self, neurons: IntArray) -> Rewind:
         """How these neurons go back, with the synapses and rules of all connections that begin or end at them, and what
-        they have sent."""
+        they have sent; worked out once, as it is asked for twice at a reset, and the same neurons are reset often."""
+        known = neurons.tobytes()
+        if known not in self._rewinds:
+            self._rewinds[known] = self._rewind(neurons)
+        return self._rewinds[known]
+
+    def _rewind(self, neurons: IntArray) -> Rewind:
         network, begin = self.network, self._begin()
         chosen = np.zeros(len(network.neurons), dtype=np.bool_)
         chosen[neurons] = True
