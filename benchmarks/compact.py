@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
@@ -27,12 +27,19 @@ _GROUP = "neurovis: 1\nname: large\nneurons:\n  N: {{count: {}, activation: tanh
 CASES: Mapping[str, tuple[int, str]] = {
     "small": (2, "  N -> N: {weight: 0.5, pattern: all_to_all}"),
     "edges": (20_000, "  N -> N: {edges: {file: edges.csv}}"),
+    "table": (
+        20_000,
+        "  N -> N: {edges: {file: edges.tsv, columns: {from: Source, to: Target, weight: N}, where: {Type: chemical}}}",
+    ),
     "matrix": (1_582, "  N -> N: {matrix: {file: matrix.npy}}"),
     "pattern": (5_000, "  N -> N: {weight: 0.01, pattern: {random: {probability: 0.1}}}"),
     "drawn": (5_000, '  N -> N: {weight: "normal(0, 0.01)", pattern: {random: {probability: 0.1}}}'),
     "nearby": (10_000, "  N -> N: {weight: 0.01, pattern: {random: {probability: 0.1*exp(-distance/0.2)}}}"),
+    "nearby in space": (10_000, "  N -> N: {weight: 0.01, pattern: {random: {probability: 0.2*exp(-distance/0.2)}}}"),
     "delayed": (5_000, "  N -> N: {weight: 0.01, delay: 5, pattern: {random: {probability: 0.1}}}"),
 }
+#: of which neurons have places, and in how many dimensions
+PLACES: Mapping[str, int] = {"nearby": 2, "nearby in space": 3}
 EDGES = 1_000_000
 LIMIT = 10_000_000
 
@@ -41,18 +48,26 @@ def write(folder: Path, case: str) -> Path:
     """The spec of a case, with its data beside it."""
     neurons, entry = CASES[case]
     random = np.random.default_rng(1)
-    if case == "edges":
+    if case in ("edges", "table"):
         ends, weights = random.integers(1, neurons + 1, (EDGES, 2)), random.normal(0, 0.1, EDGES)
-        rows = (f"N{a},N{b},{w:.6g}\n" for (a, b), w in zip(ends.tolist(), weights.tolist(), strict=True))
-        (folder / "edges.csv").write_text("from,to,weight\n" + "".join(rows))
+        edges = [(f"N{a}", f"N{b}", f"{w:.6g}") for (a, b), w in zip(ends.tolist(), weights.tolist(), strict=True)]
+        if case == "edges":
+            _write(folder / "edges.csv", "from,to,weight", (f"{a},{b},{w}" for a, b, w in edges))
+        else:
+            rows = (f"{w}\tchemical\t{b}\t{a}" for a, b, w in edges)
+            _write(folder / "edges.tsv", "N\tType\tTarget\tSource", rows)
     if case == "matrix":
         np.save(folder / "matrix.npy", random.normal(0, 0.01, (neurons, neurons)))
     path = folder / f"{case}.yaml"
-    if case == "nearby":
-        np.save(folder / "places.npy", random.random((neurons, 2)))
-    more = ", position: {file: places.npy}" if case == "nearby" else ""
+    if case in PLACES:
+        np.save(folder / "places.npy", random.random((neurons, PLACES[case])))
+    more = ", position: {file: places.npy}" if case in PLACES else ""
     path.write_text(_GROUP.format(neurons, more) + entry + "\n")
     return path
+
+
+def _write(path: Path, head: str, rows: Iterable[str]) -> None:
+    path.write_text("\n".join([head, *rows, ""]))
 
 
 def _arrays(value: object, seen: set[int]) -> Iterator[np.ndarray]:
@@ -99,13 +114,16 @@ def measured(path: Path, what: str) -> dict[str, float]:
     return made
 
 
-def by_hand(places: np.ndarray) -> float:
-    """Seconds of drawing the connections of "nearby" in NumPy alone, 256 rows at a time."""
+def by_hand(places: np.ndarray, most: float) -> float:
+    """Seconds of drawing connections by distance in NumPy alone, 256 rows at a time; ``most``: the chance at 0."""
     random, begun = np.random.default_rng(1), time.process_time()
     found = []
     for start in range(0, len(places), 256):
-        x, y = (places[start : start + 256, None, axis] - places[None, :, axis] for axis in (0, 1))
-        chances = 0.1 * np.exp(-np.sqrt(x * x + y * y) / 0.2)
+        apart = np.zeros((len(places[start : start + 256]), len(places)))
+        for axis in places.T:
+            along = axis[start : start + 256, None] - axis[None, :]
+            apart += along * along
+        chances = most * np.exp(-np.sqrt(apart) / 0.2)
         i, j = np.nonzero(random.random(chances.shape) < chances)
         found.append((i + start, j))
     np.concatenate(found, axis=1)
@@ -113,7 +131,7 @@ def by_hand(places: np.ndarray) -> float:
 
 
 def main(cases: list[str]) -> None:
-    row = "| {:8} | {:>11} | {:>7} | {:>7} | {:>7} | {:>7} | {:>12} | {:>7} |"
+    row = "| {:15} | {:>11} | {:>7} | {:>7} | {:>7} | {:>7} | {:>12} | {:>7} |"
     print(row.format("case", "connections", "seconds", "stay, B", "peak, B", "run, B", "validate, MB", "run, MB"))
     print(row.format(*["---"] * 8))
     with tempfile.TemporaryDirectory() as folder:
@@ -134,8 +152,9 @@ def main(cases: list[str]) -> None:
                 *(f"{peak / 1e6:.0f}" for peak in peaks),
             )
             print(row.format(case, f"{int(count):,}", *cells), flush=True)
-            if case == "nearby":
-                print(f"  its connections drawn in NumPy by hand: {by_hand(np.load(path.parent / 'places.npy')):.2f} s")
+            if case in PLACES:
+                hand = by_hand(np.load(path.parent / "places.npy"), 0.1 if case == "nearby" else 0.2)
+                print(f"  its connections drawn in NumPy by hand: {hand:.2f} s")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ its model are (``groups`` makes each).
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -112,20 +113,20 @@ class Census:
     def straight(self, one: Indices, other: Indices) -> FloatArray:
         """How far neurons are from others; the indices broadcast. Squares, a sum and a root are rounded in one way on
         every machine, as no other function is; a power of two, which rounds nothing, keeps squares from overflowing."""
-        position, power = self._scaled
+        position, scale = self._scaled
         squared = np.zeros(())
         for axis in range(position.shape[1]):
             difference = position[one, axis] - position[other, axis]
             np.multiply(difference, difference, out=difference)
             squared = difference if not axis else np.add(squared, difference, out=squared)
-        return np.ldexp(np.sqrt(squared, out=squared), power, out=squared)
+        return np.multiply(np.sqrt(squared, out=squared), scale, out=squared)
 
     @cached_property
-    def _scaled(self) -> tuple[FloatArray, int]:
-        """The positions, divided by a power of two so that none is beyond 1, and its exponent."""
+    def _scaled(self) -> tuple[FloatArray, float]:
+        """The positions, divided by a power of two so that none is beyond 2, and this power."""
         most = np.abs(self.neurons.position).max(initial=0, where=np.isfinite(self.neurons.position))
-        power = int(np.frexp(most)[1])
-        return np.ldexp(self.neurons.position, -power), power
+        power = min(int(np.frexp(most)[1]), sys.float_info.max_exp - 1)
+        return np.ldexp(self.neurons.position, -power), 2.0**power
 
     @cached_property
     def misplaced(self) -> npt.NDArray[np.bool_]:
