@@ -108,6 +108,7 @@ def test_counts_of_each_neuron() -> None:
     assert found == {j: j for j in range(1, 6)}
     found = Counter(i for i, _ in pairs("{fixed_outdegree: {count: 5 - i}}"))
     assert found == {i: 5 - i for i in range(5)}
+    assert pairs("{nearest: {count: i % 3}}", PLACED) == [(1, 0), (2, 1), (2, 3), (4, 3), (5, 3), (5, 4)]
     drawn = Counter(i for i, _ in pairs('{fixed_outdegree: {count: "uniform(0, 5)"}}', "A: {count: 40}"))
     assert set(drawn.values()) == {1, 2, 3, 4, 5}
 

@@ -109,7 +109,7 @@ PATTERNS: Final[Mapping[str, Pattern]] = {
         Pattern(
             "nearest",
             "Every source with its nearest targets, by position, or by index where no neuron has a position.",
-            {"count": Setting(3, "How many targets each source has.", 0)},
+            {"count": _count("targets each source has", OF_SOURCE)["count"]},
         ),
         Pattern(
             "small_world",

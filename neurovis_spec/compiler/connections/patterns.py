@@ -115,8 +115,7 @@ def _nearest_misfit(ends: Ends, values: Values) -> _Misfit | None:
     places = np.concatenate((ends.source_places, ends.target_places))
     known = np.isfinite(places).all(axis=1)
     if known.all() or not known.any():
-        counts = np.full(len(ends.sources), int(values.numbers["count"]), dtype=np.int64)
-        return _count_misfit(ends, values._replace(counts=counts), "source", "target")
+        return _count_misfit(ends, values, "source", "target")
     message = "'nearest' goes by position, and some neurons of these ends have none"
     return _Misfit(message, None, "no-position", "give all of them a 'position', or none")
 
@@ -158,8 +157,8 @@ RECIPES: Final[Mapping[str, _Recipe]] = {
         alone=True,
     ),
     "nearest": _Recipe(
-        lambda n, m, values: int(values.numbers["count"]) * n,
-        lambda ends, values, stream: nearest(ends, int(values.numbers["count"])),
+        _least_counted,
+        lambda ends, values, stream: nearest(ends, values.counts),
         _nearest_misfit,
     ),
     "small_world": _Recipe(

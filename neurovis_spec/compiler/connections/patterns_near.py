@@ -19,20 +19,21 @@ _CELLS = 1 << 22
 _LEAF = 32
 
 
-def nearest(ends: Ends, count: int) -> Pairs:
-    """Every source with its ``count`` nearest targets, by position, or, where no neuron has one, by |i − j|. Of targets
-    equally far the first ones are taken; a source's own neuron is left out, if it may not connect to itself."""
+def nearest(ends: Ends, counts: IntArray) -> Pairs:
+    """Every source with as many of its nearest targets as its count says (n,), by position, or, where no neuron has
+    one, by |i − j|. Of targets equally far the first ones are taken; a source's own neuron is left out, if it may not
+    connect to itself."""
     n = len(ends.sources)
     placed = np.isfinite(ends.source_places).all() and len(ends.source_places) == n
-    columns = _by_position(ends, count) if placed else _by_index(ends, count)
-    return np.repeat(np.arange(n, dtype=np.int64), count), columns
+    columns = _by_position(ends, counts) if placed else _by_index(ends, counts)
+    return np.repeat(np.arange(n, dtype=np.int64), counts), columns
 
 
-def _by_index(ends: Ends, count: int) -> IntArray:
+def _by_index(ends: Ends, counts: IntArray) -> IntArray:
     """The nearest by |i − j| lie in a window around i, or at the last targets where there are fewer targets than
     sources."""
     n, m = len(ends.sources), len(ends.targets)
-    excluded = ends.excluded()
+    excluded, count = ends.excluded(), int(counts.max(initial=0))
     width = min(m, 2 * count + 3)  # i itself, and count + 1 on each side, as one may be excluded
     batches: list[IntArray] = []
     together = max(1, _CELLS // width)
@@ -41,11 +42,11 @@ def _by_index(ends: Ends, count: int) -> IntArray:
         columns = np.clip(rows - count - 1, 0, m - width)[:, None] + np.arange(width)
         distances = np.abs(rows[:, None] - columns).astype(np.float64)
         distances[columns == excluded[rows, None]] = np.inf
-        batches.append(columns[_is_among_least(distances, count)])
+        batches.append(columns[_is_among_least(distances, counts[rows])])
     return np.concatenate(batches)
 
 
-def _by_position(ends: Ends, count: int) -> IntArray:
+def _by_position(ends: Ends, counts: IntArray) -> IntArray:
     """Sources and targets are split into the leaves of a k-d tree. For a leaf of sources the closest leaves of targets
     say how far the nearest can be; then only leaves whose boxes are within that reach are compared.
 
@@ -53,14 +54,14 @@ def _by_position(ends: Ends, count: int) -> IntArray:
     in the same order, and rounding keeps an order. So the result is that of comparing all pairs.
     """
     sources, targets = _scaled_against_overflow(ends)
-    excluded, m = ends.excluded(), len(targets)
-    size = max(_LEAF, 2 * count, math.isqrt(m) // 16)
+    excluded, m, largest = ends.excluded(), len(targets), int(counts.max(initial=0))
+    size = max(_LEAF, 2 * largest, math.isqrt(m) // 16)
     leaves = _leaves(targets, size)
     lengths = np.array([len(leaf) for leaf in leaves])
     low, high = _boxes(targets, leaves)
-    result = np.empty((len(sources), count), dtype=np.int64)
+    begins, result = np.cumsum(counts) - counts, np.empty(int(counts.sum()), dtype=np.int64)
     for rows in _leaves(sources, size):
-        places = sources[rows]
+        places, count = sources[rows], max(1, int(counts[rows].max()))
         # per axis the gap between the box of these sources and the box of each leaf of targets
         gaps = np.maximum(0.0, np.maximum(low - places.max(axis=0), places.min(axis=0) - high))
         squared_box_distances = _squared(gaps)
@@ -74,9 +75,10 @@ def _by_position(ends: Ends, count: int) -> IntArray:
         )
         columns = np.sort(np.concatenate([leaves[leaf] for leaf in np.flatnonzero(squared_box_distances <= reach)]))
         for batch, squared in _squared_distances(places, rows, targets, columns, excluded):
-            taken = np.broadcast_to(columns, squared.shape)[_is_among_least(squared, count)]
-            result[batch] = taken.reshape(len(batch), count)
-    return result.reshape(-1)
+            taken = _is_among_least(squared, counts[batch])
+            among = np.cumsum(taken, axis=1) - 1  # which of those of its source each is
+            result[(begins[batch, None] + among)[taken]] = np.broadcast_to(columns, squared.shape)[taken]
+    return result
 
 
 def _squared_distances(
@@ -124,11 +126,13 @@ def _boxes(places: FloatArray, leaves: list[IntArray]) -> tuple[FloatArray, Floa
     return low, np.array([places[leaf].max(axis=0) for leaf in leaves])
 
 
-def _is_among_least(distances: FloatArray, count: int) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """Whether each number is among the ``count`` least of its row; of equal ones the first are."""
-    limit = np.partition(distances, count - 1, axis=1)[:, count - 1, None]
+def _is_among_least(distances: FloatArray, counts: IntArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    """Whether each number is among the least of its row, of which there are ``counts`` (rows,); of equal ones the
+    first are."""
+    last = np.maximum(counts, 1) - 1
+    limit = np.take_along_axis(np.partition(distances, np.unique(last), axis=1), last[:, None], axis=1)
     less, equal = distances < limit, distances == limit
-    wanted = count - np.count_nonzero(less, axis=1)
+    wanted = counts - np.count_nonzero(less, axis=1)
     taken: np.ndarray[tuple[int, ...], np.dtype[np.bool_]] = less | (
         equal & (np.cumsum(equal, axis=1) <= wanted[:, None])
     )
