@@ -20,6 +20,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.called import names_of, unit_of
 from neurovis_spec.scene.caption import CAPTION
+from neurovis_spec.scene.pathways import group_of, numbered
 from neurovis_spec.scene.renderers import RendererError
 
 BoolArray = npt.NDArray[np.bool_]
@@ -246,14 +247,14 @@ def _ranks(network: Network, order: IntArray) -> IntArray:
     """Who comes first, of connections in this order: 0 the strongest that arrives at a neuron, or that it sends where
     nothing arrives; 1 that of a pathway; 2 that of an entry; 3 those of each neuron in each of its pathways; 4 the
     rest."""
-    ends, group, groups = network.connections, _groups(network), len(network.neurons.groups)
+    ends, group, groups = network.connections, group_of(network), len(network.neurons.groups)
     sources, targets = ends.sources[order], ends.targets[order]
     ranks = np.full(len(order), 4, np.int64)
     for rank, same in (
         (3, sources * groups + group[targets]),
         (3, targets * groups + group[sources]),
         (2, ends.entry[order]),
-        (1, _pathways(network)[order]),
+        (1, numbered(network)[order]),
         (0, targets),
     ):
         ranks[_first(same)] = rank
@@ -267,24 +268,12 @@ def _first(values: IntArray) -> IntArray:
     return np.unique(values, return_index=True)[1]
 
 
-def _groups(network: Network) -> IntArray:
-    """Of each neuron the number of its group."""
-    groups = network.neurons.groups
-    return np.repeat(np.arange(len(groups)), [group.count for group in groups])
-
-
-def _pathways(network: Network) -> IntArray:
-    """Of each connection the number of its pathway: that of the group that it comes from, then of that it goes to."""
-    ends, group = network.connections, _groups(network)
-    return group[ends.sources.whole()] * len(network.neurons.groups) + group[ends.targets.whole()]
-
-
 def losses(network: Network, lines: BoolArray, kept: BoolArray) -> list[str]:
     """Which pathways lost how many of the ``lines`` where these are ``kept``, those that lost most first, the last of
     them together; what several instances of a module have is one. Nothing where there is one pathway."""
     names, groups = names_of(network).called, network.neurons.groups
     called = [names[unit_of(group)] for group in groups]
-    numbers, members = np.unique(_pathways(network)[lines], return_inverse=True)
+    numbers, members = np.unique(numbered(network)[lines], return_inverse=True)
     lost, of = np.bincount(members, ~kept[lines]).astype(np.int64), np.bincount(members)
     found: dict[tuple[str, str], tuple[int, int]] = {}
     for number, fewer, count in zip(numbers.tolist(), lost.tolist(), of.tolist(), strict=True):
@@ -304,6 +293,6 @@ def losses(network: Network, lines: BoolArray, kept: BoolArray) -> list[str]:
 
 def bare(network: Network, lines: BoolArray, kept: BoolArray) -> tuple[int, int]:
     """How many neurons and how many pathways have lines of which none is kept."""
-    ends, pathways = network.connections, _pathways(network)
+    ends, pathways = network.connections, numbered(network)
     before, after = (np.union1d(ends.sources[some], ends.targets[some]) for some in (lines, kept))
     return len(before) - len(after), len(np.unique(pathways[lines])) - len(np.unique(pathways[kept]))
