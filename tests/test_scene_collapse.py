@@ -15,6 +15,8 @@ import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.scene import THEMES, Scene, colours, still
 from neurovis_spec.scene.collapse import gathered
+from neurovis_spec.scene.gathered_layout import laid_out
+from neurovis_spec.scene.look import Excerpt, excerpted
 from neurovis_spec.scene.teachers import drawn_teachers
 
 SPEC = """
@@ -195,6 +197,23 @@ def test_instances_that_are_not_collapsed_keep_their_frames_where_all_is_laid_ou
     network.render(tmp_path / "x.svg", step=1, collapse=["left", "right2", "P"])
     said = {"".join(text.itertext()) for text in ET.parse(tmp_path / "x.svg").iterfind(".//{*}text")}
     assert {"right1", "right3"} <= said
+
+
+@pytest.mark.parametrize("collapse", [["left", "right"], ["left", "right2"], ["left", "right", "P"]])
+def test_the_plan_of_the_page_holds_where_glyphs_are_laid_out_anew(collapse: list[str]) -> None:
+    plan = "right]], plan: [[left1, P, right1], [left2, null, right2]]}"
+    network = nv.compile_text(MODULES.replace("right]]}", plan))
+    members = excerpted(network.network, network.network.render, Excerpt(collapse)).collapse
+    there = network.placed()
+    together = replace(there, positions=dict.fromkeys(there.positions, (0.0, 0.0)))
+    where: dict[str, list[tuple[float, float]]] = {}
+    for name, point in laid_out(gathered(network.network, members), together).positions.items():
+        where.setdefault(name.partition(".")[0], []).append(point)
+    x, y = ({name: np.mean(places, axis=0)[axis] for name, places in where.items()} for axis in (0, 1))
+    for row in "12":
+        assert x[f"left{row}"] < x["P"] < x[f"right{row}"]
+        assert abs(y[f"left{row}"] - y[f"right{row}"]) <= 1
+    assert abs(y["P"] - y["left1"]) < (y["left2"] - y["left1"]) / 2
 
 
 def test_a_neuron_that_is_named_twice_is_one_glyph(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ signals. What runs within a glyph is not drawn. The network is drawn, never run.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray, IntColumn, integers, reals
 from neurovis_spec.compiler.drawing.drawing_settings import (
+    Cell,
     LayoutSettings,
     Mirror,
     RenderSettings,
@@ -380,7 +381,16 @@ class _Gatherer:
             neuron_spacing=old.neuron_spacing,
             rank_spacing=old.rank_spacing,
             mirrors=tuple(mirrors),
+            plan=tuple(self._plan()),
         )
+
+    def _plan(self) -> Iterator[Cell]:
+        """The cells of the page, and of instances that are not within a glyph, with what stands in them whole."""
+        scopes = {"", *(instance.path for instance in self._instances())}
+        for cell in self.whole.layout.plan:
+            units = self._whole_units(cell.members)
+            if units and cell.scope in scopes:
+                yield replace(cell, members=tuple(units))
 
     def _render(self) -> RenderSettings:
         old = self.whole.render

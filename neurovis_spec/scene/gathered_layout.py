@@ -148,6 +148,7 @@ def _problem(drawn: Gathered, pins: dict[str, Point], spacing: float) -> LayoutP
         spacing=(spacing * settings.neuron_spacing, spacing * settings.rank_spacing),
         modules=() if pins else [(instance.path, instance.module) for instance in network.instances],
         mirrors=() if pins or not pairs else [("", pairs, alike)],
+        plan=() if pins else [(cell.scope, [names[i] for i in cell.members], cell.seat) for cell in settings.plan],
     ).canonical()
 
 
