@@ -16,7 +16,14 @@ const readable = {
 };
 const reader = await McapIndexedReader.Initialize({ readable });
 const readers = new Map();
+const properties = {};
 for (const [id, { name, encoding, data }] of reader.schemasById) {
+  if (encoding === "jsonschema") {
+    const schema = JSON.parse(new TextDecoder().decode(data));
+    if (schema.type !== "object") throw new Error(`${name} is described as ${schema.type}`);
+    properties[name] = schema.properties;
+    continue;
+  }
   const ros2 = encoding === "ros2msg";
   const definitions = parse(new TextDecoder().decode(data), { ros2 });
   readers.set(id, ros2 ? new TwoReader(definitions) : new OneReader(definitions));
@@ -25,10 +32,15 @@ for (const [id, { name, encoding, data }] of reader.schemasById) {
 const messages = [];
 for await (const message of reader.readMessages()) {
   const channel = reader.channelsById.get(message.channelId);
+  if (channel.messageEncoding === "json") {
+    const data = JSON.parse(new TextDecoder().decode(message.data));
+    messages.push({ topic: channel.topic, time: String(message.logTime), sequence: message.sequence, data, label: null });
+    continue;
+  }
   const value = readers.get(channel.schemaId).readMessage(message.data);
   const data = typeof value.data === "string" ? value.data : [...value.data];
   const label = value.layout?.dim[0].label ?? null;
   messages.push({ topic: channel.topic, time: String(message.logTime), sequence: message.sequence, data, label });
 }
 await file.close();
-console.log(JSON.stringify({ profile: reader.header.profile, messages }));
+console.log(JSON.stringify({ profile: reader.header.profile, messages, properties }));

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import struct
 import subprocess
@@ -10,7 +11,9 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from time import sleep
+from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -20,8 +23,10 @@ from mcap.writer import CompressionType, Writer
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.ros.bags import read_bag
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.named_values import NamedValues
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.wire import label_of, step_of, text_of
 
@@ -71,7 +76,7 @@ def test_other_programs_read_it(network: nv.CompiledNetwork, path: Path) -> None
         summary = reader.get_summary()
         assert summary is not None
         assert summary.statistics is not None
-        assert summary.statistics.message_count == 1 + 3 * 40
+        assert summary.statistics.message_count == 1 + 4 * 40
         messages = list(reader.iter_messages())
         about = {item.name: item.metadata for item in reader.iter_metadata()}["neurovis"]
     assert about["hash"] == network.hash
@@ -80,9 +85,11 @@ def test_other_programs_read_it(network: nv.CompiledNetwork, path: Path) -> None
     assert (schema and schema.name, channel.topic) == ("std_msgs/msg/String", "/robot/bag/spec")
     assert nv.compile_text(text_of(first.data, "cdr")).hash == network.hash
     topics = {c.topic for _, c, _ in messages}
-    assert topics == {f"/robot/bag/{name}" for name in ("spec", "activity", "weights", "states")}
+    assert topics == {f"/robot/bag/{name}" for name in ("spec", "activity", "weights", "states", "values")}
     for schema, channel, message in messages[1:]:
         assert schema is not None
+        if channel.topic.endswith("/values"):
+            continue
         assert (schema.name, schema.encoding) == ("std_msgs/msg/Float64MultiArray", "ros2msg")
         assert "MSG: std_msgs/MultiArrayDimension" in schema.data.decode()
         assert channel.message_encoding == "cdr"
@@ -95,6 +102,81 @@ def test_other_programs_read_it(network: nv.CompiledNetwork, path: Path) -> None
         kinds = [type(record).__name__ for record in StreamReader(file, validate_crcs=True, emit_chunks=True).records]
     assert kinds[-1] == "Footer"
     assert kinds.count("Chunk") == summary.statistics.chunk_count
+
+
+def by_name(path: Path) -> list[tuple[int, dict[str, Any]]]:
+    """The steps and the messages with names, and whether each is as its schema says."""
+    found = []
+    with path.open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            if channel.topic.endswith("/values"):
+                assert schema is not None
+                assert (schema.name, schema.encoding, channel.message_encoding) == (
+                    "neurovis.Values",
+                    "jsonschema",
+                    "json",
+                )
+                found.append((message.sequence, json.loads(message.data)))
+                jsonschema.validate(found[-1][1], json.loads(schema.data))
+    return found
+
+
+def test_tools_find_neurons_by_their_names(network: nv.CompiledNetwork, path: Path) -> None:
+    made, found = network.run(), by_name(path)
+    assert [step for step, _ in found] == list(range(40))
+    for step, message in found:
+        assert list(message) == ["A1", "A2", "A3", "O"]
+        assert list(message.values()) == pytest.approx(made.activity[step].tolist(), rel=1e-8)
+
+
+LEGS = """\
+neurovis: 1
+name: legs
+time: {steps: 4}
+modules: {leg: {neurons: {K: {count: 2, bias: 1 + i}, O: {}}}}
+neurons: {A: {bias: 0.5}}
+instances: {left: {module: leg}, right: {module: leg}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("key", "found"),
+    [
+        ("", {"A": 0.5, "left": {"K1": 1, "K2": 2, "O": 0}, "right": {"K1": 1, "K2": 2, "O": 0}}),
+        ("ros: {values: [right.K, A]}", {"right": {"K1": 1, "K2": 2}, "A": 0.5}),
+        ("ros: {values: left}", {"left": {"K1": 1, "K2": 2, "O": 0}}),
+        ("ros: {values: false}", None),
+    ],
+)
+def test_the_spec_says_whose_names_there_are(key: str, found: dict[str, Any] | None, tmp_path: Path) -> None:
+    network = nv.compile_text(f"{LEGS}{key}\n")
+    network.run_to(tmp_path / "x.mcap")
+    assert [message for _, message in by_name(tmp_path / "x.mcap")] == [found] * 4 * (found is not None)
+    assert network.hash == nv.compile_text(LEGS).hash
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        played = read_bag(tmp_path / "x.mcap")
+    assert [topic.name.rpartition("/")[2] for topic in played.topics] == ["spec", "activity"]
+    assert_same(nv.load(tmp_path / "x.mcap"), network.run())
+
+
+def test_of_many_neurons_no_numbers_are_written_twice(tmp_path: Path) -> None:
+    for count, key, held in ((256, "", 2), (257, "", 0), (257, "ros: {values: true}", 2)):
+        spec = f"neurovis: 1\nname: many\nneurons: {{A: {{count: {count}}}}}\n{key}\n"
+        nv.compile_text(spec).run_to(tmp_path / "x.mcap", 2)
+        assert len(by_name(tmp_path / "x.mcap")) == held
+
+
+def test_what_is_not_finite_has_no_number() -> None:
+    values = NamedValues.of(["A", "b.K", "b.c.K", "b.O"], [3, 0, 2, 1])
+    row = np.array([np.nan, 1e300, -np.inf, -0.0])
+    assert json.loads(values.message(row)) == {"b": {"O": 0, "c": {}, "K": 1e300}}
+    assert json.loads(values.message(np.arange(4.0))) == {"b": {"O": 3, "c": {"K": 2}, "K": 1}, "A": 0}
+
+
+def test_names_that_no_spec_has_are_whole() -> None:
+    values = NamedValues.of(["A", "A.b", 'x"%d'], [0, 1, 2])
+    assert json.loads(values.message(np.arange(3.0))) == {"A": 0, "A.b": 1, 'x"%d': 2}
 
 
 def test_chunks_are_small(tmp_path: Path) -> None:

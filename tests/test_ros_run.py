@@ -99,6 +99,24 @@ def test_what_is_published_is_the_offline_run_bit_for_bit(ros: World, tmp_path: 
         assert stamps == sorted(stamps)
 
 
+def test_activities_come_by_name_where_there_are_messages_for_that(ros: World, arm: Path) -> None:
+    known = ros.python("import importlib.util as u; print(u.find_spec('diagnostic_msgs') is not None)")
+    assert known.end() == 0
+    fields = ["status.0.name", *(f"status.0.values.{n}.{part}" for n in range(4) for part in ("key", "value"))]
+    named = {"topic": "/neurovis/arm/values", "type": "diagnostic_msgs/DiagnosticArray", "fields": fields}
+    is_known = known.out == ["True"]
+    run = ros.neurovis("ros", "run", arm)
+    run.wait_for("ready")
+    listen = [MOTORS, *([named] if is_known else [])]
+    awaited = {str(one["topic"]): 100 for one in listen}
+    peer = ros.peer(listen=listen, send=[targets(1.5, 200)], until=awaited)
+    assert peer.end() == 0
+    assert run.stop() == 0
+    if is_known:  # else the run goes on without
+        came = peer.json()["/neurovis/arm/values"]
+        assert ["arm", "A", "1.5", "M1", "0", "M2", "0", "B", "0.75"] in came
+
+
 def test_inputs_become_outputs_and_the_end_is_safe(ros: World, arm: Path) -> None:
     run = ros.neurovis("ros", "run", arm, "--format", "json")
     run.wait_for("ready")

@@ -29,7 +29,7 @@ from neurovis_spec.compiler.names.expand import Expander, constants_of
 from neurovis_spec.compiler.names.finder import Finder, finder_of
 from neurovis_spec.compiler.names.modules import Library, library_of
 from neurovis_spec.compiler.names.outputs import make_outputs
-from neurovis_spec.compiler.names.references import other_parameter
+from neurovis_spec.compiler.names.references import Directory, other_parameter
 from neurovis_spec.compiler.names.scope import Expansion, Scope, Surroundings
 from neurovis_spec.compiler.network import Input, Instance, Network, Noise, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
@@ -145,7 +145,7 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
 
         render = replace(render, figure=figure_of(spec, census, outputs, finder))
     around = Surroundings(spec, scopes[0], inputs, outputs)
-    ros = _ros(around, constants)
+    ros = _ros(around, finder.directory, constants)
     body = _body(around, request, constants)
     noises = make_noises(census, sum(entry.size for entry in inputs))
     declared.expansion.depend()  # last, as every section may have made parameters of instances structural
@@ -240,13 +240,13 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
     return replace(network, hash=content_hash(network), settable=settable)
 
 
-def _ros(around: Surroundings, constants: Constants) -> RosSettings:
+def _ros(around: Surroundings, directory: Directory, constants: Constants) -> RosSettings:
     """The ``ros`` section. Most specs have none: nothing that reads it is imported then."""
     if around.spec.ros is None:
         return RosSettings(rate=1 / constants.dt)
     from neurovis_spec.compiler.ros import ros_settings
 
-    return ros_settings(around.spec.ros, around, constants)
+    return ros_settings(around.spec.ros, around, directory, constants)
 
 
 def _body(around: Surroundings, request: Request, constants: Constants) -> BodySettings | None:

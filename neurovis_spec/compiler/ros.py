@@ -11,7 +11,7 @@ from functools import partial
 from typing import Final
 
 from neurovis_spec.compiler.limits import plural
-from neurovis_spec.compiler.names.references import key_of, known_inputs
+from neurovis_spec.compiler.names.references import Directory, key_of, known_inputs, resolve
 from neurovis_spec.compiler.names.scope import Surroundings
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.ros_settings import (
@@ -21,10 +21,11 @@ from neurovis_spec.compiler.ros_settings import (
     RosSettings,
     Subscription,
     absolute,
+    by_name,
 )
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
-from neurovis_spec.language.located import Formula, value_or
+from neurovis_spec.language.located import Formula, Located, value_or
 from neurovis_spec.language.model import names_of, opening
 from neurovis_spec.language.ros import PublishModel, RosModel, SubscribeModel
 from neurovis_spec.language.ros_types import Field, all_types, fields_of, misspelt, numbers_of, plain
@@ -37,12 +38,14 @@ _DATA: Final = "data"
 #: The types of what the network itself publishes.
 _ARRAY: Final = "std_msgs/Float64MultiArray"
 _SPEC: Final = "std_msgs/String"
+_VALUES: Final = "diagnostic_msgs/DiagnosticArray"
 #: The most steps a second that a node makes unless the spec says so.
 _MOST_RATE: Final = 1000 * (1 + 1e-9)
 
 
-def ros_settings(model: RosModel, around: Surroundings, constants: Constants) -> RosSettings:
-    """The ``ros`` section of a spec. What is invalid in it is reported and left out."""
+def ros_settings(model: RosModel, around: Surroundings, directory: Directory, constants: Constants) -> RosSettings:
+    """The ``ros`` section of a spec, whose ``directory`` knows what references name. What is invalid in it is reported
+    and left out."""
     rate = None if model.rate is None else _above_zero(model.rate, "'rate' is steps a second", constants)
     if model.rate is None and "rate" not in model.unknown and constants.timed and 1 / constants.dt > _MOST_RATE:
         message = f"a node would make {1 / constants.dt:,.6g} steps a second, by dt; above 1,000 they are written"
@@ -60,16 +63,30 @@ def ros_settings(model: RosModel, around: Surroundings, constants: Constants) ->
         depth=depth,
         subscribe=tuple(_subscriptions(model, around, constants)),
         publish=tuple(_publications(model, around, constants)),
+        values=_values(model, directory, constants.findings),
     )
-    _check_topics(model, settings, known(around.spec.name.value, ""), constants.findings)
+    name, neurons = known(around.spec.name.value, ""), len(directory.members)
+    _check_topics(model, settings, name, bool(by_name(settings.values, neurons)), constants.findings)
     return settings
 
 
-def _check_topics(model: RosModel, settings: RosSettings, name: str, findings: Findings) -> None:
-    """A topic has messages of one type, and of one output: who listens cannot tell them apart."""
+def _values(model: RosModel, directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+    """The neurons that are published by name; None where the spec does not say, or what it says is invalid."""
+    if model.values is None:
+        return None
+    if isinstance(model.values, Located):
+        return tuple(directory.members) if model.values.value else ()
+    return known(resolve(model.values.parts, directory, findings, instances=True), None)
+
+
+def _check_topics(model: RosModel, settings: RosSettings, name: str, named: bool, findings: Findings) -> None:
+    """A topic has messages of one type, and of one output: who listens cannot tell them apart. ``named`` is whether
+    activities are published by name, too."""
     node = f"{settings.namespace.rstrip('/')}/{name}"
     own = {f"{node}/activity": "the activities", f"{node}/weights": "the weights", f"{node}/spec": "the spec"}
     types = {topic: _SPEC if what == "the spec" else _ARRAY for topic, what in own.items()}
+    if named:
+        own[f"{node}/values"], types[f"{node}/values"] = "the activities by name", _VALUES
     outputs = {topic: f"{what} of the network" for topic, what in own.items()}
     for output in settings.publish:
         entry = model.publish[output.output]

@@ -13,12 +13,13 @@ from typing import Annotated, ClassVar
 from pydantic import Field, ValidationInfo
 
 from neurovis_spec.diagnostics import shorten
-from neurovis_spec.language.grammar import Plain, Role, naming
+from neurovis_spec.language.grammar import BOOL, REFERENCES, Either, Plain, Role, naming
 from neurovis_spec.language.located import (
     FormulaField,
     Leaf,
     Located,
     TextsField,
+    as_bool,
     as_text,
     findings_of,
     give_up,
@@ -26,8 +27,9 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Keyed, Model
 from neurovis_spec.language.ros_types import all_types
-from neurovis_spec.language.words import Durability, OnTimeout, Reliability
-from neurovis_spec.language.yaml.source import Node
+from neurovis_spec.language.values import SEVERAL, Reference, as_reference
+from neurovis_spec.language.words import MOST_NAMED, Durability, OnTimeout, Reliability
+from neurovis_spec.language.yaml.source import Node, Scalar
 
 #: Names joined with slashes; ROS 2 has no two underscores in a row.
 _PATH = r"(?!.*__)[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"
@@ -89,6 +91,17 @@ TopicField = Annotated[Located[str], _named("a topic", TOPIC, _of_topic)]
 NamespaceField = Annotated[Located[str], _named("a namespace", NAMESPACE, _of_namespace)]
 TypeField = Annotated[Located[str], _named("a message type", TYPE, _of_type), Role("message")]
 PathField = Annotated[Located[str], _named("a field", FIELD, _of_field), Role("field")]
+
+
+def _values(node: Node, info: ValidationInfo) -> Located[bool] | Reference:
+    return as_bool(node, info) if _is_bool(node) else as_reference(node, info)
+
+
+def _is_bool(node: Node) -> bool:
+    return isinstance(node, Scalar) and isinstance(node.value, bool)
+
+
+ValuesField = Annotated[Located[bool] | Reference, Leaf(_values, Either((BOOL, SEVERAL))), REFERENCES]
 
 
 class QosModel(Model):
@@ -157,6 +170,11 @@ class RosModel(Model):
         None, description="Steps a second, which must be given where 1/dt is above 1,000 (default 1/dt)."
     )
     qos: QosModel | None = Field(None, description="Quality of service of what is published (ROS 2).")
+    values: ValuesField | None = Field(
+        None,
+        description="The neurons whose activities are published by their names, too, on …/values: references, true for "
+        f"all, false for none (default all, where there are {MOST_NAMED} at most).",
+    )
     subscribe: Annotated[Keyed[SubscribeModel], naming("input")] = Field(
         default_factory=dict, description="{input: where it comes from}."
     )

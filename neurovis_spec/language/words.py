@@ -14,6 +14,8 @@ NeuronRole = Literal["input", "hidden", "output"]
 Reliability = Literal["reliable", "best_effort"]
 Durability = Literal["volatile", "transient_local"]
 OnTimeout = Literal["hold", "zero", "stop"]
+#: a network of more neurons publishes activities by their names only where its spec says which (``ros: {values: …}``)
+MOST_NAMED: Final = 256
 
 #: How states are integrated, and what that is.
 METHODS: Final[Mapping[Method, str]] = {

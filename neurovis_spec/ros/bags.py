@@ -29,6 +29,7 @@ from neurovis_spec.ros.middleware import Ros
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.mcap_file import following
+from neurovis_spec.runtime.named_values import SCHEMA as BY_NAME
 from neurovis_spec.runtime.wire import Encoding
 
 _SQLITE: Final = b"SQLite format 3\0"
@@ -231,6 +232,8 @@ class _Mcap:
 
     def _topic(self, item: records.Topic) -> Topic | None:
         schema, known = self._schemas.get(item.schema), _ENCODINGS.get(item.encoding)
+        if schema is not None and schema.name == BY_NAME:
+            return None  # the activities again, which nobody misses
         if schema is None or known is None or "/" not in schema.name:
             why = "their type is not named" if known else f"they are encoded as '{item.encoding[:20]}'"
             self.left_out[item.topic] = why

@@ -18,7 +18,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.ros_settings import absolute
+from neurovis_spec.compiler.ros_settings import absolute, by_name
 from neurovis_spec.interrupts import deferred
 from neurovis_spec.ros.accept import ARRAY, STRING
 from neurovis_spec.ros.definitions import Definition
@@ -27,6 +27,7 @@ from neurovis_spec.ros.fields import Form
 from neurovis_spec.ros.inputs import Inputs
 from neurovis_spec.ros.listening import ACTIVITY, SPEC, WEIGHTS, Listening, base_of
 from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node, Parameter, Publisher, Quality, Tell
+from neurovis_spec.ros.named import NamedActivities
 from neurovis_spec.ros.pace import NO_CLOCK, Clock, Pace, SimulatedClock, SteadyClock
 from neurovis_spec.ros.steering import RunSteering
 from neurovis_spec.ros.summary import Counts, Summary, Teller
@@ -147,6 +148,12 @@ class NodeRun:
         self._activity = self._array(f"{base}/{ACTIVITY}", len(network.neurons), quality)
         changing = len(network.changing)
         self._weights = self._array(f"{base}/{WEIGHTS}", changing, quality) if changing else None
+        wanted = by_name(settings.values, len(network.neurons))
+        self._named = (
+            NamedActivities.of(node, f"{base}/values", network.name, network.neurons.names, wanted, quality)
+            if wanted
+            else None
+        )
         sizes = {output.name: output.size for output in network.outputs}
         self._outputs = []
         for one in settings.publish:
@@ -252,6 +259,8 @@ class NodeRun:
         for output in self._outputs:
             output.put(np.atleast_1d(outputs[output.name]), now)
         self._activity.step(step, now, activity)
+        if self._named is not None:
+            self._named.step(now, activity)
         if self._weights is not None and weights is not None:
             self._weights.step(step, now, weights)
         return True

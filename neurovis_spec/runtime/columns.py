@@ -356,6 +356,7 @@ def recording_of(
         recorded_weights=None if len(columns.weights) in (0, len(network.changing)) else columns.weights,
         spec=columns.spec,
         namespace=network.ros.namespace,
+        by_name=network.ros.values,
         sensors=None if columns.sensors is None else rows.sensors,
         sensor_names=columns.sensors or (),
         pose=None if columns.skeleton is None else rows.pose,

@@ -2,8 +2,9 @@
 
 In: a Recording and a path, or a path. Out: a file that can be read at any moment while it is written, or a Recording.
 Topics are ``NAMESPACE/NETWORK/activity``, ``/weights`` (of the changing connections), ``/states``, ``/sensors`` and
-``/pose`` of a body, and ``/spec``. What does not grow with the steps, the *frame* (a recording without rows), is an
-attachment, as an archive like a ``.npz``. A recording may go on from file to file: ``NAME.mcap``, ``NAME-1.mcap``, ….
+``/pose`` of a body, and ``/spec``; ``/values`` has activities again, by name, for those who plot them, and is passed
+over here. What does not grow with the steps, the *frame* (a recording without rows), is an attachment, as an archive
+like a ``.npz``. A recording may go on from file to file: ``NAME.mcap``, ``NAME-1.mcap``, ….
 """
 
 from __future__ import annotations
@@ -22,11 +23,13 @@ from time import monotonic
 
 import numpy as np
 
+from neurovis_spec.compiler.ros_settings import by_name
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.arrived import Arrived
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.files import Part, move, part_of, regular_size
 from neurovis_spec.runtime.mcap_records import Channel, DamagedError, Found, Message, Schema, Topic
+from neurovis_spec.runtime.named_values import SCHEMA, NamedValues
 from neurovis_spec.runtime.npz_file import frame_bytes, frame_from_bytes, recording_errors
 from neurovis_spec.runtime.recording import Recording, after_rows, ended
 from neurovis_spec.runtime.rows import KINDS, After, Rows, RowWriter, Steps
@@ -78,6 +81,7 @@ def stream_mcap(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWrite
 def mcap_size(frame: Recording, steps: Steps) -> int:
     """About the bytes that a file takes."""
     each = [8 * width + 200 for width in frame.widths if width]
+    each += [20 + len(frame.neurons[neuron]) for neuron in by_name(frame.by_name, len(frame.neurons))]
     return len(steps) * sum(each) + len(frame_bytes(frame)) + len(frame.spec)
 
 
@@ -101,9 +105,16 @@ class _McapRows:
             (KINDS.index(name), n, ArrayForm.of(label, sizes[name], "cdr")) for n, name in enumerate(recorded, 2)
         ]
         about = {"network": frame.network, "hash": frame.hash, "dt": repr(frame.dt), "version": __version__}
+        schemas, named = [Schema(*ARRAY), Schema(*STRING)], by_name(frame.by_name, len(frame.neurons))
+        self._values = NamedValues.of(frame.neurons, named) if named else None
+        if self._values is not None:
+            schemas.append(Schema(SCHEMA, self._values.schema, "jsonschema"))
+            channels.append(Channel(len(schemas), f"{base}/values", "json"))
+        #: the channel of what has names
+        self._named = len(channels)
         start = records.head("ros2", f"neurovis {__version__}") + records.metadata(_ABOUT, about)
         start += records.attachment(FRAME, frame_bytes(replace(frame, spiking=None)))  # spikes are not in it
-        start += records.schemas_and_channels([Schema(*ARRAY), Schema(*STRING)], channels)
+        start += records.schemas_and_channels(schemas, channels)
         if frame.spec:
             start += records.chunk([Message(1, 0, 0, 0, text_message(frame.spec, "cdr"))])
         records.put(file, start)
@@ -138,6 +149,8 @@ class _McapRows:
             for kind, channel, form in self._channels:
                 data = form.message(step, seconds, rows[kind][row])
                 yield Message(channel, step % (1 << 32), time, time, data)
+            if self._values is not None:
+                yield Message(self._named, step % (1 << 32), time, time, self._values.message(rows.activity[row]))
 
     def close(self) -> None:
         """What is true after the last step, then index and footer."""

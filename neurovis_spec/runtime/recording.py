@@ -123,6 +123,8 @@ class Recording:
     #: the spec as one text and the namespace of its topics, for formats that hold them
     spec: str = ""
     namespace: str = "/neurovis"
+    #: the neurons whose activities such formats hold by name, too; None: all, where they are few
+    by_name: tuple[int, ...] | None = None
     sensors: FloatArray | None = None
     sensor_names: tuple[str, ...] = ()
     pose: FloatArray | None = None
