@@ -100,7 +100,7 @@ def test_auto_draws_mirror_images_as_it_draws_what_has_none() -> None:
     few = replace(many, edges=many.edges[:100])
     assert choose_engine(few)[0] == choose_engine(replace(few, mirrors=mirror))[0] == "layered"
     # what others show best has no mirror images there
-    placed = replace(few, places=tuple((float(i), 0.0) for i in range(300)))
+    placed = replace(few, places=tuple((float(i % 20), float(i // 20)) for i in range(300)))
     assert (choose_engine(placed)[0], choose_engine(replace(placed, mirrors=mirror))[0]) == ("spatial", "layered")
 
 

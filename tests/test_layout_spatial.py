@@ -1,14 +1,22 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
+from dataclasses import replace
+from itertools import pairwise
+from typing import cast
 
+import numpy as np
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.layout import LayoutProblem, LayoutRefusalError
+from neurovis_spec.layout import LayoutProblem, LayoutRefusalError, SizingEngine
 from neurovis_spec.layout.arrange import lay_out_problem
-from neurovis_spec.layout.geometry import sampled
+from neurovis_spec.layout.choose import choose_engine
+from neurovis_spec.layout.engines import engine_of
+from neurovis_spec.layout.frames import Frames, entered
+from neurovis_spec.layout.geometry import near_pairs, sampled
 from neurovis_spec.layout.model import RADIUS
 from neurovis_spec.layout.problem import NamedProblem
 
@@ -140,3 +148,91 @@ def test_auto_draws_by_position_where_every_neuron_has_one() -> None:
     text = "neurovis: 1\nname: x\nneurons: {A: {count: 3, position: [i, i*i]}MORE}\n"
     assert nv.compile_text(text.replace("MORE", "")).layout().engine == "spatial"
     assert nv.compile_text(text.replace("MORE", ", B: {}")).layout().engine == "layered"
+
+
+LAYERS = {"L23": 0.0, "L4": 6.0, "L5": 9.0, "L6": 11.0}
+
+
+def column(wide: float, high: float = 15.0) -> LayoutProblem:
+    """Four layers of 60 neurons each, one below the other, each in a box."""
+    ends = [*LAYERS.values(), 15.0]
+    places = {
+        f"{layer}_{i}": (
+            wide * ((i * 0.7548776662466927) % 1),
+            (top + (end - top) * ((i * 0.569840291) % 1)) * high / 15,
+        )
+        for (layer, top), end in zip(LAYERS.items(), ends[1:], strict=True)
+        for i in range(60)
+    }
+    boxes = [(layer, [name for name in places if name.startswith(f"{layer}_")]) for layer in LAYERS]
+    return NamedProblem("column", list(places), places=places, boxes=boxes).canonical()
+
+
+def test_crowded_places_are_spread_and_neighbours_stay_neighbours() -> None:
+    problem = column(4.0)
+    layout = lay_out_problem(problem, "spatial")
+    places = np.array([layout.positions[name] for name in problem.neurons])
+    data = np.array(problem.places)
+    assert near_pairs(places, 2 * RADIUS)[0].size == 0
+    size = np.ptp(places, axis=0) + 2 * RADIUS
+    assert problem.disc(tuple(size)) > 5.0  # at the scale that gives most discs room it would be 3.4
+    for axis in (0, 1):
+        assert np.corrcoef(places[:, axis], data[:, axis])[0, 1] > 0.99
+    near, there = (np.argsort(np.hypot(*(at[:, None] - at[None]).T), axis=1)[:, 1:9] for at in (data, places))
+    assert np.mean([len({*a} & {*b}) / 8 for a, b in zip(near.tolist(), there.tolist(), strict=True)]) > 0.7
+
+
+def test_boxes_that_a_line_parts_are_spread_each_by_itself() -> None:
+    problem = column(4.0)
+    layout = lay_out_problem(problem, "spatial")
+    frames = Frames(problem).rects({i: layout.positions[name] for i, name in enumerate(problem.neurons)}, {})
+    for rect, (_, own) in zip(frames, problem.boxes, strict=True):
+        assert rect is not None
+        assert not entered(np.array(list(layout.positions.values())), rect, own)
+    ordered = [rect for rect in (*frames[3:], *frames[:3]) if rect is not None]
+    for upper, lower in pairwise(ordered):  # as the layers are, from L23 to L6
+        assert upper[3] < lower[1]
+
+
+def test_what_is_in_one_place_does_not_stand_among_what_is_in_the_next() -> None:
+    names = [f"{group}{i}" for group in "ABC" for i in range(50)]
+    places = {name: (float("ABC".index(name[0])), 0.0) for name in names}
+    boxes = [(group, [name for name in names if name[0] == group]) for group in "ABC"]
+    at = lay_out_problem(NamedProblem("x", names, places=places, boxes=boxes).canonical(), "spatial").positions
+    for left, right in pairwise("ABC"):
+        assert max(at[f"{left}{i}"][0] for i in range(50)) < min(at[f"{right}{i}"][0] for i in range(50))
+
+
+def test_what_overlaps_nowhere_is_to_scale_however_large_it_is() -> None:
+    names = [f"N{i}" for i in range(600)]
+    places = {name: (float(i % 3), float(i // 3)) for i, name in enumerate(names)}
+    at = lay_out_problem(NamedProblem("x", names, places=places).canonical(), "spatial").positions
+    factor = at["N1"][0]
+    for name, (x, y) in places.items():
+        assert at[name] == pytest.approx((factor * x, factor * y), abs=0.005)
+
+
+def test_auto_declines_positions_whose_discs_nobody_would_see() -> None:
+    strip, page = column(0.4), column(8.0)
+    engine, why = choose_engine(strip)
+    assert engine == "layered"
+    assert why == "where their 'position' says, as 'spatial' draws them, discs would have a radius of 1.7 pixels"
+    assert choose_engine(page)[0] == "spatial"
+    wide = lay_out_problem(page, "spatial").positions.values()
+    size = cast(SizingEngine, engine_of("spatial")).size(page)
+    for axis in (0, 1):
+        assert size[axis] == pytest.approx(
+            max(p[axis] for p in wide) - min(p[axis] for p in wide) + 2 * RADIUS, abs=0.01
+        )
+    # a page as slim as the strip has room for it
+    assert choose_engine(replace(strip, aspect=0.1))[0] == "spatial"
+
+
+def test_a_disc_is_never_smaller_than_a_line() -> None:
+    at = ", ".join(f"[{(i * 0.7548) % 1:.3f}, {(i * 0.5698) % 15:.3f}]" for i in range(300))
+    wired = "connections: {A1 -> A2: 1, A7 -> A30: 2, A9 -> A90: 5}"
+    body = f"neurons: {{A: {{count: 300, position: [{at}]}}}}\n{wired}"
+    svg = nv.compile_text(f"neurovis: 1\nname: x\n{body}\nlayout: {{engine: spatial}}\n").layout()._repr_svg_()
+    least = min(float(r) for r in re.findall(r"<circle [^>]*\br=\"([\d.]+)\"", svg))
+    lines = re.findall(r"<path [^>]*stroke-width=\"([\d.]+)\"", svg)
+    assert max(map(float, lines)) <= 2 * least

@@ -36,12 +36,12 @@ _INSTANCE: Rect = (-PAD, -PAD - TITLE, PAD, PAD)
 
 
 @dataclass(frozen=True, slots=True)
-class _Box:
+class Box:
     """The neurons of a box or an instance, and the boxes within it; how far its line is from centres (4,), and how
     large it is for its title (2,), at least."""
 
     members: IntArray
-    within: Sequence[_Box]
+    within: Sequence[Box]
     line: FloatArray
     title: FloatArray
 
@@ -76,7 +76,7 @@ def boxes_apart(
     ``labels`` (``apart``) in the frames of their neurons. Pinned neurons stay, and mirror images are such all the
     time."""
     count = len(problem.neurons)
-    boxes = _framed(problem)
+    boxes = framed(problem)
     if not boxes and labels is None:
         return places
     places = places.copy()
@@ -84,18 +84,18 @@ def boxes_apart(
     pinned[list(problem.pins)] = True
     pinned |= pinned[symmetry.image]
     sizes = _Sizes(spacing, np.full((count, 4), np.nan) if labels is None else labels)
-    _divided(places, _Box(np.arange(count), boxes, np.zeros(4), np.zeros(2)), pinned, sizes, symmetry)
+    _divided(places, Box(np.arange(count), boxes, np.zeros(4), np.zeros(2)), pinned, sizes, symmetry)
     return places
 
 
-def _framed(problem: LayoutProblem) -> list[_Box]:
+def framed(problem: LayoutProblem) -> list[Box]:
     """The boxes and instances of a problem, the outermost of those within others; none where there are too many."""
     titles = instance_titles((module.path, module.module) for module in problem.modules)
     given = [(m.members, _INSTANCE, title) for m, title in zip(problem.modules, titles, strict=True)]
     given += [(members, _LINE, title_room(name, BOX_WEIGHT)) for name, members in problem.boxes]
     level = problem.direction in ("right", "left")
     frames = [
-        _Box(
+        Box(
             np.array(sorted(members), dtype=np.int64),
             (),
             np.array(turned(line, problem.direction)),
@@ -106,10 +106,10 @@ def _framed(problem: LayoutProblem) -> list[_Box]:
     return _within(_wholes(frames)) if len(frames) <= _MOST_BOXES else []
 
 
-def _wholes(boxes: Sequence[_Box]) -> list[_Box]:
+def _wholes(boxes: Sequence[Box]) -> list[Box]:
     """Boxes of which any two share nothing, or one holds the other, the largest first: those that share some of their
     neurons are one."""
-    wholes: dict[frozenset[int], _Box] = {}
+    wholes: dict[frozenset[int], Box] = {}
     for box in boxes:
         whole, line, title = frozenset(box.members.tolist()), box.line, box.title
         while crossing := [
@@ -121,13 +121,13 @@ def _wholes(boxes: Sequence[_Box]) -> list[_Box]:
             line = np.concatenate([lines[:, :2].min(axis=0), lines[:, 2:].max(axis=0)])
             title = np.max([title, *(one.title for one in found)], axis=0)
         if whole:
-            wholes[whole] = _Box(np.array(sorted(whole), dtype=np.int64), (), line, title)
+            wholes[whole] = Box(np.array(sorted(whole), dtype=np.int64), (), line, title)
     return [wholes[whole] for whole in sorted(wholes, key=lambda whole: (-len(whole), min(whole)))]
 
 
-def _within(wholes: Sequence[_Box]) -> list[_Box]:
+def _within(wholes: Sequence[Box]) -> list[Box]:
     """The outermost of these, each with those within it."""
-    boxes: list[_Box] = []
+    boxes: list[Box] = []
     rest = list(wholes)
     while rest:
         outer = rest[0]
@@ -138,7 +138,7 @@ def _within(wholes: Sequence[_Box]) -> list[_Box]:
     return boxes
 
 
-def _divided(places: FloatArray, box: _Box, pinned: BoolArray, sizes: _Sizes, symmetry: Symmetry) -> None:
+def _divided(places: FloatArray, box: Box, pinned: BoolArray, sizes: _Sizes, symmetry: Symmetry) -> None:
     """Move the neurons of a box: its boxes off each other, who is in none of them out of them."""
     for number, inner in enumerate(box.within):
         own = inner.members
@@ -171,7 +171,7 @@ def _divided(places: FloatArray, box: _Box, pinned: BoolArray, sizes: _Sizes, sy
 
 
 def _pushed(
-    places: FloatArray, box: _Box, pinned: BoolArray, labels: FloatArray, symmetry: Symmetry
+    places: FloatArray, box: Box, pinned: BoolArray, labels: FloatArray, symmetry: Symmetry
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Where the frames of the boxes in a box are when no two overlap, nor the pins beside them, half of their sizes,
     and how far they have moved for that (k, 2 each). Those with pins stay; one that is its own mirror image moves along
@@ -213,7 +213,7 @@ def _pushed(
     return centres[:count], half[:count], (centres - start)[:count]
 
 
-def _image(boxes: Sequence[_Box], box: _Box, symmetry: Symmetry) -> int:
+def _image(boxes: Sequence[Box], box: Box, symmetry: Symmetry) -> int:
     """Which of these boxes holds the images of one's neurons, −1 where that is none."""
     paired = box.members[symmetry.image[box.members] != box.members]
     images = set(symmetry.image[paired].tolist())

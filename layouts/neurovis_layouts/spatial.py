@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 
-from neurovis_layouts.apart import apart, jitter
+from neurovis_layouts.apart import apart
+from neurovis_layouts.crowds import extent, fanned, reduction, spread
 from neurovis_layouts.finish import alone, drawn, nearest, pinned_places
 from neurovis_layouts.frame import from_picture
 from neurovis_layouts.routing.bows import unhindered
@@ -29,8 +30,6 @@ _BEYOND = 0.35
 _ROUNDED = 1e-9
 #: Closer than this share of what they had in a row is as good as in one place.
 _CLOSEST = 0.05
-#: Room for each of those that stand in one place.
-_CROWD = 0.9
 
 
 class SpatialEngine:
@@ -43,6 +42,7 @@ class SpatialEngine:
         boxes=True,
         direction=True,
         memory=True,
+        sizes=True,
         neurons=200_000,
         edges=2_000_000,
         suits="positions",
@@ -52,31 +52,44 @@ class SpatialEngine:
         """Scale the positions, keep discs apart, route the edges."""
         if not problem.neurons:
             return Layout(problem.network, self.name, {}, {})
-        data = _data(problem)
-        exponent = np.frexp(np.abs(data[np.isfinite(data)]).max(initial=0.0))[1]
-        data = np.ldexp(data, -exponent)  # their unit is free, and near 1 no distance is too small or too large
-        fixed, there = pinned_places(problem)
-        known = np.isfinite(data.sum(axis=1))
-        places = data * _factor(data[known]) * problem.neuron_spacing
-        pinned = known[fixed]
-        if pinned.any():
-            places += (there[pinned] - places[fixed[pinned]]).mean(axis=0)
-        places[fixed] = there
-        known[fixed] = True
-        held, spacing = np.flatnonzero(known), problem.neuron_spacing
-        places[held] = _fanned(places[held], _CROWD * spacing)
-        places[fixed] = there
-        places[held] = apart(places[held], _APART * spacing, np.searchsorted(held, fixed))
-        if not known.all():  # what has a place stays there
-            free = np.flatnonzero(~known)
-            places[free] = _fanned(_beside(places, problem), _CROWD * spacing)[free]
-            places = apart(places, _APART * spacing, held)
+        places = _placed(problem)
         low, high = places.min(axis=0), places.max(axis=0)
         beyond = max(1.0, _BEYOND * float((high - low).min()))
         within = (*(low - beyond).tolist(), *(high + beyond).tolist())
         centres: list[Point] = [(x, y) for x, y in places.tolist()]
         clear = alone(problem, unhindered(problem.edges, centres, REACH - _ROUNDED))
         return drawn(problem, self.name, places, clear, within)
+
+    def size(self, problem: LayoutProblem) -> Point:
+        """How wide and high that is, but for routes."""
+        return extent(problem, _placed(problem))
+
+
+def _placed(problem: LayoutProblem) -> FloatArray:
+    """(n, 2) where the neurons stand, pinned ones exactly where they are pinned."""
+    data = _data(problem)
+    exponent = np.frexp(np.abs(data[np.isfinite(data)]).max(initial=0.0))[1]
+    data = np.ldexp(data, -exponent)  # their unit is free, and near 1 no distance is too small or too large
+    fixed, there = pinned_places(problem)
+    known, spacing = np.isfinite(data.sum(axis=1)), problem.neuron_spacing
+    places: FloatArray = data * _factor(data[known]) * spacing
+    smaller = None if len(fixed) else reduction(problem, places[known])
+    if smaller is not None:
+        return spread(problem, _beside(places * smaller, problem), _APART * spacing)
+    pinned = known[fixed]
+    if pinned.any():
+        places += (there[pinned] - places[fixed[pinned]]).mean(axis=0)
+    places[fixed] = there
+    known[fixed] = True
+    held = np.flatnonzero(known)
+    places[held] = fanned(places[held], spacing)
+    places[fixed] = there
+    places[held] = apart(places[held], _APART * spacing, np.searchsorted(held, fixed))
+    if not known.all():  # what has a place stays there
+        free = np.flatnonzero(~known)
+        places[free] = fanned(_beside(places, problem), spacing)[free]
+        places = apart(places, _APART * spacing, held)
+    return places
 
 
 def _data(problem: LayoutProblem) -> FloatArray:
@@ -127,16 +140,3 @@ def _factor(data: FloatArray) -> float:
     half, tenth = np.maximum(np.quantile(next_one, [0.5, 0.1]), _CLOSEST / len(spots)).tolist()
     factor = _HALF / half
     return float(np.clip(_NINE_TENTHS / tenth, factor, _GROWTH * factor)) / extent
-
-
-def _fanned(places: FloatArray, spacing: float) -> FloatArray:
-    """Places, those in exactly one spot fanned out around it."""
-    _, spot, times = np.unique(places, axis=0, return_inverse=True, return_counts=True)
-    spot = spot.reshape(-1)
-    order = np.argsort(spot, kind="stable")
-    rank = np.zeros(len(places), dtype=np.int64)
-    rank[order] = np.arange(len(places)) - (np.cumsum(times) - times)[spot[order]]
-    crowd = times[spot]
-    fan = jitter(int(rank.max(initial=0)) + 1)[rank] * (spacing * np.sqrt(crowd))[:, None]
-    fanned: FloatArray = places + np.where(crowd > 1, 1.0, 0.0)[:, None] * fan
-    return fanned

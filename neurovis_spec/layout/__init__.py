@@ -18,6 +18,7 @@ from neurovis_spec.layout.model import (
     ReportingEngine,
     Route,
     Side,
+    SizingEngine,
 )
 from neurovis_spec.progress import Progress
 
@@ -42,4 +43,5 @@ __all__ = [
     "ReportingEngine",
     "Route",
     "Side",
+    "SizingEngine",
 ]

@@ -8,9 +8,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence, Set
+from dataclasses import replace
+from typing import cast
 
 from neurovis_spec.layout.engines import engine_of, engines_that, refuse
-from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, Suits
+from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, SizingEngine, Suits
 
 #: A component of so many neurons, with so many connections each within their group, is a tangle.
 _LARGE, _DENSE = 40, 2.5
@@ -31,6 +33,11 @@ _MOST_PARTS = 500
 #: ranks. But at least this share of the neurons have one neighbour: what is mostly chains is long, and ranks it is.
 _MOST_TO_AND_FRO, _MOST_IN_ROW, _ENDS = 60, 120, 0.1
 
+#: Discs whose radius has fewer pixels than this cannot be told from lines. No engine draws them larger where there are
+#: more neurons than this.
+_SEEN, _MOST_SEEN = 3.0, 2000
+
+_USUAL = "the default for networks whose positions are not all given"
 _TANGLED = "its neurons drive one another in loops so densely that ranks would say nothing"
 
 
@@ -39,6 +46,9 @@ def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
     it best is drawn by the one for clusters, if that can do all that is asked. Raises LayoutRefusalError where none is
     installed."""
     suits, why = _most_suitable(problem)
+    if suits == "positions" and (small := _too_small(problem)):
+        suits, instead = _most_suitable(replace(problem, places=()))
+        why = small if instead == _USUAL else f"{instead}; {small}"
     name = _suited(suits)
     if _takes(name, problem):
         return name, why
@@ -54,6 +64,18 @@ def _suited(suits: Suits) -> str:
     if not names:
         raise LayoutRefusalError("unknown-engine", f"no layout engine is installed that suits {suits}")
     return names[0]
+
+
+def _too_small(problem: LayoutProblem) -> str:
+    """How small discs would be where their positions are, in words; '' where they can be seen."""
+    name = _suited("positions")
+    engine = engine_of(name)
+    if not engine.capabilities.sizes or len(problem.neurons) > _MOST_SEEN or not _takes(name, problem):
+        return ""
+    radius = problem.disc(cast(SizingEngine, engine).size(problem))
+    if radius >= _SEEN:
+        return ""
+    return f"where their 'position' says, as '{name}' draws them, discs would have a radius of {radius:.1f} pixels"
 
 
 def _takes(name: str, problem: LayoutProblem) -> bool:
@@ -101,7 +123,7 @@ def _unasked(problem: LayoutProblem) -> tuple[Suits, str]:
     if edges > _MOST_IN_RANKS and not _in_layers(problem):
         shown = ", and instances show as such, not as frames drawn alike" if problem.modules else ""
         return "clusters", f"its {edges} connections are too many to follow each: clusters say more{shown}"
-    return "flow", "the default for networks whose positions are not all given"
+    return "flow", _USUAL
 
 
 def _in_branches(problem: LayoutProblem) -> bool:

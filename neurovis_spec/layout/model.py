@@ -8,6 +8,7 @@ a neuron's disc is 0.6 across.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, TypeAlias, get_args, runtime_checkable
@@ -26,6 +27,8 @@ Side = Literal["right", "left", "below", "above"]
 SIDES: tuple[Side, ...] = get_args(Side)
 #: Width by height of a page: that of a screen or a slide.
 PAGE = 4 / 3
+#: Pixels that a picture without a stated size has for the network, beside its margins, title and legend.
+ROOM = (1228.0, 720.0)
 #: How long an engine may look for fewer crossings.
 Effort = Literal["quick", "normal", "best"]
 EFFORTS: tuple[Effort, ...] = get_args(Effort)
@@ -163,6 +166,12 @@ class LayoutProblem:
         """Width by height of the page."""
         return PAGE if self.aspect is None else self.aspect
 
+    def disc(self, size: Point) -> float:
+        """The radius of discs in pixels, about, in a drawing of this width and height (layout units) that fills the
+        default page, or one as large of the shape that the author says."""
+        turned = 1.0 if self.aspect is None else math.sqrt(self.aspect * ROOM[1] / ROOM[0])
+        return RADIUS * min(ROOM[0] * turned / max(size[0], 1.0), ROOM[1] / turned / max(size[1], 1.0))
+
 
 @dataclass(frozen=True, slots=True)
 class Layout:
@@ -205,6 +214,8 @@ class Capabilities:
     frames: bool = False
     #: says what it would refuse, and routes nothing for it: ``check`` takes a problem (CheckingEngine)
     checks: bool = False
+    #: says how large its drawing will be before it routes anything: ``size`` takes a problem (SizingEngine)
+    sizes: bool = False
     #: what it shows best, of which ``auto`` takes the first engine by name
     suits: Suits | None = None
     #: says how far it is: ``lay_out`` takes a Progress as its second argument (ReportingEngine)
@@ -241,6 +252,14 @@ class CheckingEngine(LayoutEngine, Protocol):
 
     def check(self, problem: LayoutProblem) -> None:
         """Raises the LayoutRefusalError that ``lay_out`` would."""
+        ...
+
+
+class SizingEngine(LayoutEngine, Protocol):
+    """An engine that knows how large its drawing will be before it routes anything; it declares ``sizes``."""
+
+    def size(self, problem: LayoutProblem) -> Point:
+        """Width and height of the picture of a problem that it draws, in units of the layout."""
         ...
 
 
