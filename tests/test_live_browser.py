@@ -43,10 +43,11 @@ async def fit(opened: Page, width: int, height: int, density: float = 1.0) -> No
 
 @asynccontextmanager
 async def shown(
-    spec: str, folder: Path, theme: str | None = None, takes: frozenset[str] | None = None
+    spec: str, folder: Path, theme: str | None = None, takes: frozenset[str] | None = None, curves: bool = False
 ) -> AsyncIterator[tuple[Page, nv.CompiledNetwork, Access]]:
     """A live view of an example, opened in a window that shows its picture a pixel a pixel; of what its source takes
-    only these messages count, where they are given."""
+    only these messages count, where they are given. Unless ``curves`` are wanted, those that it begins with are
+    unpinned."""
     compiled = nv.compile(SPECS / spec)
     view = view_of(compiled, compiled.gains, theme)
     hub = Hub(asyncio.get_running_loop(), REQUESTS if takes is None else frozenset())
@@ -66,6 +67,8 @@ async def shown(
             await opened.size(width, height)
             await opened.call("Page.navigate", url=access.url())
             await opened.until(f"{STEP} >= 0")
+            if not curves:
+                await opened.ask("document.querySelectorAll('#strips .pin').forEach((pin) => pin.click())")
             await fit(opened, width, height)
             yield opened, compiled, access
             assert opened.errors == []

@@ -46,7 +46,7 @@ def neurons(*indices: int) -> Members:
 
 
 def connections(*indices: int) -> Members:
-    return Members("connections", np.array(indices), added=True)
+    return Members("connections", np.array(indices), "sum")
 
 
 @pytest.mark.parametrize("recorded", [False, True])

@@ -72,6 +72,31 @@ def test_what_is_held_has_its_trace_and_several_are_pinned(tmp_path: Path) -> No
     asyncio.run(main())
 
 
+def test_a_page_begins_with_the_output_its_target_and_the_error(tmp_path: Path) -> None:
+    """And the error falls, without a click."""
+
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path, curves=True) as (opened, compiled, _):
+            assert [await opened.ask(TITLE.format(at)) for at in range(3)] == ["OT", "T − O", ""]
+            await opened.ask("const speed = document.querySelector('#speed'); speed.value = 'max'; speed.onchange()")
+            await opened.until(f"{STEP} > 2000")
+            last = await pause(opened)
+            steps = f"from step {last - 1000} to {last}"
+            await opened.until(f"{TRACE.format(0)}?.startsWith('O and T {steps}')")
+            await opened.until(f"{TRACE.format(1)}?.startsWith('T − O {steps}')")
+            run = compiled.run(last + 1)
+            error = run["T"] - run["O"]
+            assert np.abs(error[last - 1000 :]).max() < 0.7 * np.abs(error[:1000]).max()
+            now = float(str(await opened.ask("document.querySelectorAll('.now')[1].textContent")).replace("−", "-"))
+            assert now == pytest.approx(error[last], rel=1e-5)
+            assert await drawn(opened, 0)
+            assert await drawn(opened, 1)
+            await opened.ask("document.querySelectorAll('.of')[1].click()")  # of an error there is nothing to be held
+            assert await opened.ask(TITLE.format(2)) == ""
+
+    asyncio.run(main())
+
+
 def test_strips_share_their_axis_with_the_scrubber(tmp_path: Path) -> None:
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):

@@ -138,7 +138,7 @@ def test_traces_are_read_of_what_came(source: ReceivedSource) -> None:
     nan = float("nan")
     found = source.history.read(Members("neurons", np.array([1])), bins)
     assert np.array_equal(found[:, 0], [0, 1, 2, nan, nan, nan, 6, 7, nan], equal_nan=True)
-    found = source.history.read(Members("connections", np.array([0]), added=True), bins)
+    found = source.history.read(Members("connections", np.array([0]), "sum"), bins)
     assert np.array_equal(found[:, 1], [0.5, 1.5, 2.5, nan, nan, nan, 6.5, 7.5, nan], equal_nan=True)
 
 

@@ -40,11 +40,31 @@ class Bins:
 @dataclass(frozen=True, slots=True, eq=False)
 class Members:
     """What a trace is of, by indices: activities of neurons, or the states that they show; weights of connections; or
-    quantities. Several are ``added`` up, as weights and signals are, or else it is their mean."""
+    quantities; each ``less`` another, where there are such. Several are joined to their mean, their sum, as weights and
+    signals are, or their root mean square."""
 
     of: Of
     indices: IntArray
-    added: bool = False
+    joined: Literal["mean", "sum", "rms"] = "mean"
+    less: IntArray | None = None
+
+    @property
+    def read(self) -> IntArray:
+        """The indices of all that is read for it."""
+        return self.indices if self.less is None else np.concatenate((self.indices, self.less))
+
+    def join(self, values: FloatArray | Range) -> FloatArray | Range:
+        """Values (rows, members) of what is read as those of what is drawn for them (rows,)."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            if self.less is not None:
+                values = values[:, : len(self.indices)] - values[:, len(self.indices) :]
+            if values.shape[1] == 1:
+                return values[:, 0]
+            if self.joined == "rms":
+                mean: FloatArray = np.mean(np.square(values, dtype=np.float64), 1)
+                return np.asarray(np.sqrt(mean))
+            joined: FloatArray = (np.sum if self.joined == "sum" else np.mean)(values, 1, np.float64)
+            return joined
 
 
 class History(Protocol):
@@ -68,18 +88,9 @@ def _ranges(steps: IntArray, values: FloatArray | Range, bins: Bins) -> Range:
     return result
 
 
-def _joined(members: Members, values: FloatArray | Range) -> FloatArray | Range:
-    """Values (rows, members) as those of what is drawn for them."""
-    if values.shape[1] == 1:
-        return values[:, 0]
-    with np.errstate(over="ignore", invalid="ignore"):
-        joined: FloatArray = np.sum(values, 1, np.float64) if members.added else np.mean(values, 1, np.float64)
-        return joined
-
-
 def _thinned(rows: IntArray, members: Members) -> IntArray:
     """Rows to be read, so that together with the members they are not too many."""
-    return rows[:: max(1, -(-len(rows) * len(members.indices) // _READ))]
+    return rows[:: max(1, -(-len(rows) * len(members.read) // _READ))]
 
 
 class Ring:
@@ -124,7 +135,7 @@ class Ring:
         first, last = self._first, self._last
         end = min(last, bins.first + bins.every * bins.count - 1)
         steps = _thinned(np.arange(max(first, bins.first), end + 1), members)
-        columns = members.indices + self._starts[members.of]
+        columns = members.read + self._starts[members.of]
         if len(columns) and columns.max() >= self._values.shape[1]:
             return np.full((bins.count, 2), np.nan, np.float32)
         if len(columns) > 1 or not len(steps):
@@ -133,7 +144,7 @@ class Ring:
             (column,), begin, end = columns, steps[0] % self._size, steps[-1] % self._size + 1
             parts = [(begin, end)] if begin < end else [(begin, self._size), (0, end)]
             values = np.concatenate([self._values[one:other, column] for one, other in parts])[:, None]
-        return _ranges(steps, _joined(members, values), bins)
+        return _ranges(steps, members.join(values), bins)
 
 
 class Recorded:
@@ -162,7 +173,7 @@ class Recorded:
         ends = np.searchsorted(steps, [bins.first, bins.first + bins.every * bins.count])
         rows = _thinned(np.arange(*ends), members)
         if members.of == "neurons":
-            values = self._told[rows[:, None], members.indices]
+            values = self._told[rows[:, None], members.read]
         elif members.of == "quantities":
             columns = self._quantities[members.indices]
             values = np.full((len(rows), len(columns)), np.nan)
@@ -171,7 +182,7 @@ class Recorded:
         else:
             column, values = self._column[members.indices], np.tile(self._fixed[members.indices], (len(rows), 1))
             values[:, column >= 0] = self._recording.weights[rows[:, None], column[column >= 0]]
-        return _ranges(steps[rows], _joined(members, values), bins)
+        return _ranges(steps[rows], members.join(values), bins)
 
     def _put_spikes(self, values: FloatArray, steps: IntArray, neurons: IntArray) -> None:
         """Put the spikes of these neurons into the columns of values (rows, columns) where there are some, each into

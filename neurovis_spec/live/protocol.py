@@ -71,8 +71,8 @@ _MOST = (1 << 53) - 1
 #: The most components of an input, and parameters set at once.
 _MANY = 1024
 #: The most items whose values a client gets, and the id of one: of a neuron or a connection, perhaps with the name of
-#: something that it has.
-_WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}(\.[A-Za-z_]\w{0,4095})?", re.ASCII)
+#: something that it has; or of an error.
+_WATCHED, _ITEM = 64, re.compile(r"[nce][0-9]{1,9}(\.[A-Za-z_]\w{0,4095})?", re.ASCII)
 #: The gains of Eqs. 2–5.
 _GAINS = ("activity", "signal", "thickness", "change")
 #: The most items that a client is sent traces of at once, and rasters, the most bins, and steps in each.

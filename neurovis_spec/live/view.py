@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -21,6 +21,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SPIKE, SYNAPSE
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.commands import AS_IT_IS, Appearance
+from neurovis_spec.live.curves import Curves, curves_of
 from neurovis_spec.live.declared import declared
 from neurovis_spec.live.drawing import Moved, content, moved
 from neurovis_spec.live.history import Members
@@ -88,6 +89,8 @@ class View:
     #: what can be asked for by a name, and the names of what is drawn
     quantities: Quantities
     listed: Listed
+    #: what a page shows the course of from the beginning
+    curves: Curves
     #: what stays of a picture of the same network in which more changes, at least so wide (page units)
     planned: Callable[[Network, float], tuple[Gathered, Plan]]
 
@@ -122,34 +125,41 @@ class View:
         return result
 
     def values(self, seen: Seen, items: Iterable[str], quantities: FloatArray | None = None) -> dict[str, float]:
-        """Exact activities, or states that are shown (``n3``), weights (``c5``) and ``quantities`` (``c5.g``) at a
-        step, by these ids; unknown ones are left out, and quantities of which nothing is known."""
+        """Exact activities, or states that are shown (``n3``), weights (``c5``), ``quantities`` (``c5.g``) and errors
+        (``e0``) at a step, by these ids; unknown ones are left out, and quantities of which nothing is known."""
         snapshot = self.drawn.snapshot(seen.snapshot)
         result = dict[str, float]()
         for item in items:
             key, _, name = item.partition(".")
             values, index = snapshot.told if item[0] == "n" else snapshot.weights, int(key[1:])
-            if name:
+            if item[0] == "e":
+                error = self.members(item)
+                if error is not None:
+                    result[item] = float(error.join(seen.snapshot.told[error.read][None])[0])
+            elif name:
                 members = None if quantities is None else self.members(item)
                 if members is not None and quantities is not None:
                     own = quantities[members.indices]
-                    value = float(own.sum() if members.added else own.mean())
+                    value = float(own.sum() if members.joined == "sum" else own.mean())
                     result |= {} if math.isnan(value) else {item: value}
             elif index < len(values):
                 result[item] = float(values[index])
         return result
 
     def members(self, item: str) -> Members | None:
-        """What of the network an item stands for (``n3``, ``c5``), or what of that has a name (``c5.g``); None where
-        there is none."""
+        """What of the network an item stands for (``n3``, ``c5``), what of that has a name (``c5.g``), or an error
+        (``e0``); None where there is none."""
         key, _, name = item.partition(".")
+        if item[0] == "e":
+            errors = self.curves.errors[int(key[1:]) :]
+            return errors[0] if errors and not name else None
         neurons = item[0] == "n"
         members = np.flatnonzero((self.drawn.unit if neurons else self.drawn.bundle) == int(key[1:]))
         if not name:
-            found = Members("neurons", members) if neurons else Members("connections", members, added=True)
+            found = Members("neurons", members) if neurons else Members("connections", members, "sum")
         else:
             places = self.quantities.places("neuron" if neurons else "connection", name, members)
-            found = Members("quantities", places, added=not neurons and name == SYNAPSE.gives)
+            found = Members("quantities", places, "sum" if not neurons and name == SYNAPSE.gives else "mean")
         return found if len(found.indices) else None
 
     def raster(self, item: str) -> tuple[tuple[str, ...], tuple[Members, ...]]:
@@ -169,10 +179,11 @@ class View:
         return (whole.names[firing[0]], whole.names[firing[-1]]), tuple(Members("quantities", of) for of in places)
 
     def place(self, item: str) -> tuple[int, int]:
-        """The number of an item that there is among connections, then neurons; and that of its name among those that
-        the page knows, from 1 on, 0 without one."""
+        """The number of an item that there is among connections, then neurons, then errors; and that of its name among
+        those that the page knows, from 1 on, 0 without one."""
         key, _, name = item.partition(".")
-        index = int(key[1:]) + (len(self.drawn.counts) if item[0] == "n" else 0)
+        lines, discs = len(self.drawn.counts), len(self.drawn.sizes)
+        index = int(key[1:]) + {"c": 0, "n": lines, "e": lines + discs}[item[0]]
         return index, 1 + self.listed.lists[self.listed.of[index]].index(name) if name else 0
 
     def moved(self, layout: Layout) -> Moved:
@@ -228,11 +239,13 @@ def view_of(
     quantities = Quantities(network)
     listed = quantities.listed(Glyphs(drawn.unit, len(drawn.sizes)), Glyphs(drawn.bundle, len(drawn.counts)))
     names = {"named": [list(one) for one in listed.lists], "names": listed.of.tolist() if len(quantities) else []}
-    more = {**declared(compiled), **names, "themes": list(THEMES), "themed": themed}
+    curves = curves_of(drawn)
+    begins = {"curves": [asdict(curve) for curve in curves.shown]}
+    more = {**declared(compiled), **names, **begins, "themes": list(THEMES), "themed": themed}
     words = content(drawn.network, scene, rows, constants, more)
     otherwise = partial(view_of, compiled, gains, theme, engine, layout=layout)
     anew = partial(_planned, stands, seen, settings)
-    return View(drawn, seen, planned, largest, stands, words, appearance, otherwise, quantities, listed, anew)
+    return View(drawn, seen, planned, largest, stands, words, appearance, otherwise, quantities, listed, curves, anew)
 
 
 def _planned(

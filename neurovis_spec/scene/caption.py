@@ -51,14 +51,21 @@ def _decimals(dt: float) -> int:
     return min(4, max(0 if dt >= 1 and dt == round(dt) else 2, math.ceil(-math.log10(dt))))
 
 
-def _error(network: Network, activity: FloatArray) -> str | None:
-    """target − post where exactly one rule has a signal ``target``; the root mean square where they are several."""
-    aims = [projection for projection in network.projections if "target" in projection.signals]
-    if len(aims) != 1:
-        return None
-    sources, targets = aims[0].signals["target"], network.connections.targets[aims[0].members]
+def aims(network: Network) -> list[tuple[int, int]]:
+    """What neurons are to be, and which neurons (indices), where exactly one rule has a signal ``target``, which is an
+    activity; else none."""
+    found = [projection for projection in network.projections if "target" in projection.signals]
+    if len(found) != 1:
+        return []
+    sources, targets = found[0].signals["target"], network.connections.targets[found[0].members]
     pairs = sorted({(int(s), int(t)) for s, t in zip(sources.tolist(), targets.tolist(), strict=True)})
-    if not pairs or any(source >= len(activity) for source, _ in pairs):
+    return [] if any(source >= len(network.neurons) for source, _ in pairs) else pairs
+
+
+def _error(network: Network, activity: FloatArray) -> str | None:
+    """target − post; the root mean square where they are several."""
+    pairs = aims(network)
+    if not pairs:
         return None
     errors = np.array([activity[source] - activity[target] for source, target in pairs])
     if len(errors) == 1:

@@ -93,10 +93,10 @@ export class Attention {
     this.link.ask('look', { items: this.wanted() });
   }
 
-  /** The ids of neurons and connections whose values are shown, of what these have with its name. @returns {string[]} */
+  /** The ids of neurons, connections and errors whose values are shown, of what they have with its name. @returns {string[]} */
   wanted() {
     const all = new Set([this.pointed, this.held, ...this.also, ...this.listed]);
-    return [...all].filter((id) => this.groups.has(id.split('.')[0])).slice(0, 64);
+    return [...all].filter((id) => id[0] === 'e' || this.groups.has(id.split('.')[0])).slice(0, 64);
   }
 
   /** @param {string} id @param {number[]} place */

@@ -123,6 +123,7 @@ const link = new Link({
     part('titled').textContent = scene.title;
     attention.use(scene);
     strips.use();
+    if (first) strips.begin(scene.curves);
     turning.use(scene);
     outline.use(scene);
     placing.use(scene);

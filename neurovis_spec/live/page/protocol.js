@@ -22,8 +22,10 @@ import { isStill } from './camera.js';
 /** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
  *   theme: Theme, dt: number | null, discs: number, lines: number, parameters: Declared[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
- *   themed: boolean, named: string[][], names: number[], order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
+ *   themed: boolean, named: string[][], names: number[], curves: Curve[], order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
  *   groups: Group[]}} Scene */
+/** Signals in one axis, by what they are asked for, the first in front, and their names.
+ * @typedef {{items: string[], names: string[]}} Curve */
 /** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */
 /** The spikes of some neurons, a row each: in cells (rows × bins) the share that fires, in 254ths, 255 where nothing is known; the
  * names of the first and the last.
@@ -114,7 +116,8 @@ function unpackTraces(buffer, scene) {
   const ranges = new Map();
   const which = new Uint32Array(buffer, 24 + 4 * count, count);
   new Uint32Array(buffer, 24, count).forEach((item, at) => {
-    const id = item < scene.lines ? `c${item}` : `n${item - scene.lines}`,
+    const { lines, discs } = scene,
+      id = item < lines ? `c${item}` : item < lines + discs ? `n${item - lines}` : `e${item - lines - discs}`,
       name = which[at] ? `.${namesOf(scene, id)[which[at] - 1]}` : '';
     ranges.set(id + name, new Float32Array(buffer, 24 + 8 * count + 8 * bins * at, 2 * bins));
   });

@@ -7,14 +7,15 @@ import { namesOf } from './protocol.js';
 import { THUMB } from './scrubber.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
+/** @typedef {import('./protocol.js').Curve} Curve */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Raster} Raster */
 /** @typedef {import('./protocol.js').Traces} Traces */
 /** @typedef {import('./scrubber.js').Scrubber} Scrubber */
 /** What it shows of a neuron or a connection: its activity or weight where `what` is empty; `key` is what that is asked by,
- * `told` what it is called.
- * @typedef {{id: string, what: string, key: string, told: string, data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
+ * `told` what it is called; behind it, in the same axis, `behind`.
+ * @typedef {{id: string, what: string, key: string, told: string, behind: string[], data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
  *   canvas: HTMLCanvasElement, ends: HTMLElement[], pin: HTMLButtonElement, parts: HTMLElement[]}} Strip */
 
 /** What a model with a spike block has, 1 in the steps in which it fires. */
@@ -23,9 +24,13 @@ const SPIKE = 'spike';
 /** What a strip shows that is the raster of a neuron's group: no name. */
 const RASTER = '*';
 
-/** The most strips that are pinned; how high marks of spikes are; milliseconds between two traces that are asked for, and until one is asked for again. */
+/** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is; milliseconds between two traces that are asked for, and until one is asked for again. */
 const PINS = 8,
   MARK = 6,
+  HIGH = 48,
+  SHARE = 0.3,
+  PALE = 0.3,
+  WIDE = 4,
   PACE = 40,
   LOST = 2000;
 
@@ -75,6 +80,7 @@ export class Strips {
       what: '',
       key: '',
       told: '',
+      behind: [],
       data: '',
       name,
       choice,
@@ -88,10 +94,12 @@ export class Strips {
     numbers.append(...ends);
     scale.append(numbers, pin);
     canvas.setAttribute('role', 'img');
-    name.onclick = () => this.attention.hold(strip.id);
+    name.onclick = () => {
+      if (this.attention.groups.has(strip.id)) this.attention.hold(strip.id);
+    };
     pin.onclick = () => this.toggle(strip);
     choice.onchange = () => {
-      this.of(strip, this.attention.groups.get(strip.id), choice.value);
+      this.of(strip, this.group(strip.id), choice.value);
       if (strip !== this.held) this.of(this.held, this.attention.groups.get(this.held.id), this.held.what);
       this.list();
     };
@@ -103,9 +111,29 @@ export class Strips {
     return strip;
   }
 
+  /** The neuron, the connection or the error of an id. @param {string} id @returns {Group | undefined} */
+  group(id) {
+    const error = id[0] === 'e' && this.link.scene?.curves.find(({ items }) => items[0] === id);
+    return error
+      ? { id, title: error.names[0], data: { error: error.names[0] }, shapes: [] }
+      : this.attention.groups.get(id);
+  }
+
+  /** Pin the strips that a page begins with, as far as there is room for them. @param {Curve[]} curves */
+  begin(curves) {
+    const room = Math.max(1, Math.floor((SHARE * innerHeight) / HIGH) - 1);
+    for (const { items, names } of curves.slice(0, room)) {
+      const [id, what] = items[0].split('.'),
+        strip = this.strip();
+      this.pinned.push(strip);
+      this.of(strip, this.group(id), what, { items, names });
+    }
+    this.list();
+  }
+
   /** Say what a strip is of. @param {Strip} strip @param {Group | undefined} group @param {string} [what] the name of what it
-   * shows, where there is that */
-  of(strip, group, what = '') {
+   * shows, where there is that @param {Curve} [curve] what is behind that, from its second signal on */
+  of(strip, group, what = '', curve = { items: [], names: [] }) {
     const called = group ? group.title.split('\n')[0] : '',
       isPinned = strip !== this.held;
     [strip.id, strip.data] = group ? [group.id, JSON.stringify(group.data)] : ['', ''];
@@ -115,6 +143,8 @@ export class Strips {
     strip.canvas.classList.toggle('raster', strip.what === RASTER);
     strip.key = strip.what ? `${strip.id}.${strip.what}` : strip.id;
     strip.told = strip.what === RASTER ? `the group of ${called}` : strip.what ? `${called}, ${strip.what}` : called;
+    strip.behind = curve.items.slice(1);
+    if (strip.behind.length) strip.told = curve.names.join(' and ');
     const again = !isPinned && this.pinned.some(({ key }) => key === strip.key);
     const first = group?.data.neuron === undefined ? 'weight' : (group.data.state ?? 'activity');
     strip.choice.replaceChildren(
@@ -126,6 +156,11 @@ export class Strips {
     strip.choice.setAttribute('aria-label', `what is shown of ${called}`);
     strip.name.textContent = called;
     strip.name.title = called;
+    for (const other of curve.names.slice(1)) {
+      const behind = element('span', 'behind');
+      behind.textContent = other;
+      strip.name.append(behind);
+    }
     strip.pin.textContent = isPinned ? '×' : 'pin';
     strip.pin.setAttribute('aria-label', `${isPinned ? 'unpin' : 'pin'} ${strip.told}`);
     strip.pin.hidden = again || (!isPinned && this.pinned.length >= PINS);
@@ -143,10 +178,18 @@ export class Strips {
 
   /** Another network; what has the same name in it stays pinned. */
   use() {
-    const groups = [...this.attention.groups.values()];
+    const groups = [...this.attention.groups.values()],
+      curves = this.link.scene?.curves ?? [],
+      errors = curves.flatMap(({ items }) => (items[0][0] === 'e' ? (this.group(items[0]) ?? []) : []));
     this.pinned = this.pinned.filter((strip) => {
-      const same = groups.find(({ data }) => JSON.stringify(data) === strip.data);
-      if (same) this.of(strip, same, strip.what);
+      const same = [...groups, ...errors].find(({ data }) => JSON.stringify(data) === strip.data);
+      if (same)
+        this.of(
+          strip,
+          same,
+          strip.what,
+          curves.find(({ items }) => items[0] === same.id),
+        );
       return same;
     });
     this.of(this.held, this.attention.groups.get(this.held.id), this.held.what);
@@ -163,7 +206,7 @@ export class Strips {
 
   /** Pin what a strip shows, by default that of what is held, or unpin it. @param {Strip} [of] */
   toggle({ id, what, key } = this.held) {
-    const group = this.attention.groups.get(id),
+    const group = this.group(id),
       known = this.pinned.findIndex((strip) => strip.key === key);
     const focused = this.place.contains(document.activeElement);
     if (!group || (known < 0 && this.pinned.length >= PINS)) return;
@@ -188,7 +231,7 @@ export class Strips {
 
   /** Have the values of what is shown asked for. */
   want() {
-    this.attention.also = this.traced().map(({ key }) => key);
+    this.attention.also = this.traced().flatMap(({ key, behind }) => [key, ...behind]);
   }
 
   /** The strips that show traces. */
@@ -214,7 +257,9 @@ export class Strips {
       width = Math.max(1, this.held.canvas.clientWidth - 2 * THUMB);
     const traced = this.traced(),
       others = [...this.pinned, this.held].filter((strip) => !traced.includes(strip));
-    const items = [...new Set(traced.flatMap((strip) => [strip.key, this.marks(strip)]))].filter(Boolean),
+    const items = [...new Set(traced.flatMap((strip) => [strip.key, this.marks(strip), ...strip.behind]))].filter(
+        Boolean,
+      ),
       rasters = [...new Set(others.map(({ id }) => id))].slice(0, PINS);
     for (const { key, value } of [...this.pinned, this.held]) {
       const now = this.attention.values[key],
@@ -253,7 +298,8 @@ export class Strips {
     this.waiting = false;
     for (const strip of [...this.pinned, this.held]) {
       const trace = traces.ranges.get(strip.key);
-      if (trace) this.paint(strip, trace, traces, traces.ranges.get(this.marks(strip)));
+      const behind = strip.behind.flatMap((key) => traces.ranges.get(key) ?? []);
+      if (trace) this.paint(strip, trace, traces, behind, traces.ranges.get(this.marks(strip)));
     }
     this.show();
   }
@@ -298,17 +344,19 @@ export class Strips {
   }
 
   /** Draw a trace: a line, up and down in each bin where it has several steps; above it marks where it fires, unless the
-   * trace itself shows that. @param {Strip} strip @param {Float32Array} trace @param {Traces} traces
-   * @param {Float32Array} [spikes] */
-  paint(strip, trace, { first, every }, spikes) {
+   * trace itself shows that; behind it, wide and pale, others. @param {Strip} strip @param {Float32Array} trace
+   * @param {Traces} traces @param {Float32Array[]} behind @param {Float32Array} [spikes] */
+  paint(strip, trace, { first, every }, behind, spikes) {
     const { canvas } = strip,
       [context, x] = this.blank(canvas);
     const { clientWidth: width, clientHeight: height } = canvas,
       style = getComputedStyle(canvas),
       { scrubber } = this;
     let [low, high] = [Infinity, -Infinity];
-    for (const value of trace) {
-      if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
+    for (const one of [trace, ...behind]) {
+      for (const value of one) {
+        if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
+      }
     }
     const fired = spikes?.some((value, at) => value !== trace[at] && !Number.isNaN(value)) ? spikes : undefined;
     const known = low <= high,
@@ -346,22 +394,16 @@ export class Strips {
       context.lineTo(at, 1 + MARK);
       context.stroke();
     }
-    context.globalAlpha = 1;
-    context.beginPath();
-    let before = NaN;
-    for (let bin = 0; 2 * bin < trace.length; bin++) {
-      const [least, most] = [trace[2 * bin], trace[2 * bin + 1]],
-        at = x(first + bin * every + (every - 1) / 2);
-      if (!Number.isNaN(least)) {
-        // the end that is nearer to the last value first
-        const up = Math.abs(least - before) <= Math.abs(most - before);
-        if (Number.isNaN(before)) context.moveTo(at, y(least));
-        context.lineTo(at, y(up ? least : most));
-        if (most > least) context.lineTo(at, y(up ? most : least));
-        before = up ? most : least;
-      } else before = NaN;
+    /** @param {number} bin */
+    const middle = (bin) => x(first + bin * every + (every - 1) / 2);
+    for (const other of behind) {
+      context.globalAlpha = PALE;
+      context.lineWidth = WIDE;
+      follow(context, other, middle, y);
     }
-    context.stroke();
+    context.globalAlpha = 1;
+    context.lineWidth = 1.2;
+    follow(context, trace, middle, y);
     canvas.setAttribute(
       'aria-label',
       known
@@ -369,6 +411,27 @@ export class Strips {
         : `${strip.told}: nothing is known of these steps`,
     );
   }
+}
+
+/** Draw a line through bins: up and down in each that has several steps.
+ * @param {CanvasRenderingContext2D} context @param {Float32Array} trace @param {(bin: number) => number} x
+ * @param {(value: number) => number} y */
+function follow(context, trace, x, y) {
+  context.beginPath();
+  let before = NaN;
+  for (let bin = 0; 2 * bin < trace.length; bin++) {
+    const [least, most] = [trace[2 * bin], trace[2 * bin + 1]],
+      at = x(bin);
+    if (!Number.isNaN(least)) {
+      // the end that is nearer to the last value first
+      const up = Math.abs(least - before) <= Math.abs(most - before);
+      if (Number.isNaN(before)) context.moveTo(at, y(least));
+      context.lineTo(at, y(up ? least : most));
+      if (most > least) context.lineTo(at, y(up ? most : least));
+      before = up ? most : least;
+    } else before = NaN;
+  }
+  context.stroke();
 }
 
 /** A number in little room. @param {number} value @returns {string} */
