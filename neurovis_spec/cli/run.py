@@ -89,8 +89,8 @@ keeping_options: Final = as_one(
         "--states",
         metavar="REF",
         multiple=True,
-        help="Record a state or output of models (K.v) or a state of rules ('(K -> O).eligibility') as well, or 'all'. "
-        "Repeatable.",
+        help="Record a state or output of models (K.v), a state of rules ('(K -> O).eligibility') or what an input is "
+        "given (push.given) as well, or 'all' states. Repeatable.",
     ),
     click.option(
         "--neurons", metavar="REFS", multiple=True, help="Record these neurons only, such as 'O + K'; default: all."

@@ -143,7 +143,7 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
     if spec.render is not None and spec.render.figure:
         from neurovis_spec.compiler.drawing.figure import figure_of
 
-        render = replace(render, figure=figure_of(spec, census, outputs, finder))
+        render = replace(render, figure=figure_of(spec, census, inputs, outputs, finder))
     around = Surroundings(spec, scopes[0], inputs, outputs)
     ros = _ros(around, finder.directory, constants)
     body = _body(around, request, constants)

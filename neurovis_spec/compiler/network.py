@@ -788,6 +788,15 @@ class Network:
         """Input name to input."""
         return {entry.name: entry for entry in self.inputs}
 
+    @cached_property
+    def given_names(self) -> tuple[str, ...]:
+        """What inputs are given, by their places in the vector: ``push.given``, ``touch[0].given``."""
+        return tuple(
+            f"{entry.name}.given" if entry.size == 1 else f"{entry.name}[{number}].given"
+            for entry in self.inputs
+            for number in range(entry.size)
+        )
+
 
 def _holdable_in(holders: Iterable[Holder]) -> int:
     """How many numbers their states are, one a member."""

@@ -129,8 +129,9 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
 
 
 def may_be_states(path: Path) -> bool:
-    """Whether references at a path may be to states: what leaves the network, and what is held."""
-    return path[:1] == ("outputs",) or (path[:1] == ("events",) and path[2:3] == ("clamp",))
+    """Whether references at a path may be to states: what leaves the network, what is shown, and what is held."""
+    held = path[:1] == ("events",) and path[2:3] == ("clamp",)
+    return path[:1] == ("outputs",) or path[:2] == ("render", "figure") or held
 
 
 def setting_of(path: Path) -> tuple[str, str]:

@@ -1,5 +1,5 @@
-"""Columns: what of each step is kept, which are activities, changing weights and states of models and rules, and
-whose spikes are.
+"""Columns: what of each step is kept, which are activities, changing weights, states of models and rules and what
+inputs are given, and whose spikes are.
 
 In: a Network, and what is wanted of it (Keep). Out: Columns: the indices to take, and a Probe that reads states; a
 Recording of the rows that were kept.
@@ -22,7 +22,7 @@ from neurovis_spec.compiler.network import Located, Network
 from neurovis_spec.compiler.program import SPIKE, SYNAPSE, Definition, Each, Owner
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.references import find_connections, find_neurons, find_states
+from neurovis_spec.runtime.references import find_connections, find_neurons, find_recorded
 from neurovis_spec.runtime.rows import After, Rows, Widths
 from neurovis_spec.runtime.spikes import Fired
 from neurovis_spec.runtime.state import State
@@ -44,7 +44,8 @@ class Keep:
     #: whether the changing weights are, and if so of which references to connections; of all where there are none
     weights: bool = True
     connections: tuple[str, ...] = ()
-    #: references to states, besides those that the outputs of the spec name and its pictures show
+    #: references to states, besides those that the outputs of the spec name and its pictures show, and to what inputs
+    #: are given
     states: tuple[str, ...] = ()
     #: the spec itself as one text, where a format holds it
     spec: str = ""
@@ -192,12 +193,20 @@ class Columns:
     #: the names of what the body senses, and how its pose is drawn; None where there is none
     sensors: tuple[str, ...] | None = None
     skeleton: Skeleton | None = None
+    #: places in the vector of all inputs: what is given there stands behind the states, and is called as these are
+    given: IntArray = field(default_factory=_none)
+    given_names: tuple[str, ...] = ()
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """The names of states, and of what inputs are given."""
+        return (*self.probe.names, *self.given_names)
 
     def widths(self, network: Network) -> Widths:
         """How many numbers of each kind a step has."""
         neurons = len(network.neurons) if self.neurons is None else len(self.neurons)
         pose = 0 if self.skeleton is None else self.skeleton.size
-        return Widths(neurons, len(self.weights), len(self.probe.names), len(self.sensors or ()), pose)
+        return Widths(neurons, len(self.weights), len(self.state_names), len(self.sensors or ()), pose)
 
 
 def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) -> Columns:
@@ -218,8 +227,11 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
     if keep.sent and not keep.neurons and len(weights) == len(network.changing):
         of_connections = keep.weights  # which are as many as weights
         states.update(dict.fromkeys(singles(one for one in network.sent if of_connections or len(one.neurons))))
+    places: dict[int, None] = {}
     for reference in keep.states:
-        states.update(dict.fromkeys(singles(find_states(network, reference, names))))
+        found, given = find_recorded(network, reference, names)
+        states.update(dict.fromkeys(singles(found)))
+        places.update(dict.fromkeys(given))
     neurons = _neurons(keep.neurons, names, len(network.neurons))
     return Columns(
         neurons=neurons,
@@ -230,6 +242,8 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
         spec=keep.spec,
         sensors=None if body is None else body.sensor_names,
         skeleton=None if body is None else body.skeleton,
+        given=np.array([*places], dtype=np.int64),
+        given_names=tuple(network.given_names[place] for place in places),
     )
 
 
@@ -350,7 +364,7 @@ def recording_of(
         hash=network.hash,
         counted=names.counted,
         states=rows.states,
-        state_names=columns.probe.names,
+        state_names=columns.state_names,
         state_views=columns.outputs,
         recorded=columns.neurons,
         recorded_weights=None if len(columns.weights) in (0, len(network.changing)) else columns.weights,

@@ -24,6 +24,7 @@ from typing import BinaryIO
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.names.given import GIVEN
 from neurovis_spec.language.references import Sum, parse, state_of
 from neurovis_spec.real_paths import reason_of
 from neurovis_spec.runtime.errors import RecordingError
@@ -35,6 +36,8 @@ from neurovis_spec.runtime.rows import After, Rows, RowWriter, Steps
 _SENSOR = "sensor "
 #: before the names of states in the table of a partial recording
 _STATE = "state "
+#: before the names of inputs, of what these are given
+_INPUT = "input "
 #: how many kinds of numbers a table has: all but the pose, the last one
 _KINDS_KEPT = 4
 _CONNECTION = re.compile(r"(?P<source>\S+) -> (?P<target>\S+)(?: \((?P<rank>[0-9]{1,9})\))?")
@@ -101,7 +104,8 @@ class _Table:
         self._writer, self._dt = csv.writer(self._text, lineterminator="\n"), frame.dt
         names = [frame.connection_names[index] for index in frame.weight_columns.tolist()]
         sensors = [_SENSOR + name for name in frame.sensor_names]
-        states = [("" if frame.recorded is None else _STATE) + name for name in frame.state_names]
+        neurons = frozenset(frame.neurons)
+        states = [_written(name, neurons, frame.recorded is None) for name in frame.state_names]
         self._writer.writerow(["step", "t", *frame.columns, *names, *states, *sensors])
 
     def write(self, steps: IntArray, rows: Rows) -> None:
@@ -195,7 +199,8 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
     if len(set(columns)) != len(columns) or len(set(states)) != len(states):
         raise RecordingError("not a recording: a neuron or a state is named twice")
     pairs = [_ends(name) for name in connections]
-    neurons = tuple(dict.fromkeys([*columns, *(name for pair in pairs for name in pair[:2]), *_owners(states)]))
+    owners = _owners(states[: len(states) - sum(name.startswith(_INPUT) for name in header)])
+    neurons = tuple(dict.fromkeys([*columns, *(name for pair in pairs for name in pair[:2]), *owners]))
     index = {name: number for number, name in enumerate(neurons)}
     ends = [(index[source], index[target], rank) for source, target, rank in pairs]
     if len(set(ends)) != len(ends):
@@ -231,10 +236,18 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
     )
 
 
+def _written(name: str, neurons: Collection[str], whole: bool) -> str:
+    """The column of a state, or of what an input is given, in the table of a recording that is ``whole`` or partial."""
+    owner, _, state = name.rpartition(".")
+    if state == GIVEN and not owner.endswith(")") and owner not in neurons:
+        return _INPUT + owner
+    return name if whole else _STATE + name
+
+
 def _columns(names: list[str]) -> tuple[list[str], list[str], list[str]]:
     """The columns of neurons, of connections, of states: ``state K1.v``, or, where they are not marked so, those of a
     rule (``(K1 -> O).e``), of the model of a neuron that has a column itself (``K1.v``), and what is behind others that
-    are no neurons. Raises RecordingError where they are mixed."""
+    are no neurons; ``input touch`` is what that is given. Raises RecordingError where they are mixed."""
     result: tuple[list[str], list[str], list[str]] = ([], [], [])
     seen: set[str] = set()
     last = 0
@@ -243,7 +256,8 @@ def _columns(names: list[str]) -> tuple[list[str], list[str], list[str]]:
         if kind < last:
             raise RecordingError("not a recording: neurons are mixed with weights or states")
         last = kind
-        result[kind].append(name.removeprefix(_STATE))
+        is_input = name.startswith(_INPUT)
+        result[kind].append(f"{name.removeprefix(_INPUT)}.{GIVEN}" if is_input else name.removeprefix(_STATE))
         if kind == 0:
             seen.add(name)
     return result
@@ -251,7 +265,7 @@ def _columns(names: list[str]) -> tuple[list[str], list[str], list[str]]:
 
 def _kind(name: str, neurons: Collection[str], last: int) -> int:
     """Whether a column is of a neuron (0), a connection (1) or a state (2); ``last`` is what the one before it is."""
-    if name.startswith(_STATE):
+    if name.startswith((_STATE, _INPUT)):
         return 2
     written = parse(name)
     if not isinstance(written, Sum):

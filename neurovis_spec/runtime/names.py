@@ -11,8 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import count, takewhile
 from typing import NamedTuple
 
+from neurovis_spec.compiler.names.given import GIVEN
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.references import Arrow, NeuronRange, Part, RuleState, parse_sum, state_of
 from neurovis_spec.likeness import suggest
@@ -63,6 +65,8 @@ class Names:
         single = False
         if name is None:
             return None
+        if name.state == GIVEN and isinstance(self.find(name.owner.text), str):
+            return self._given(name.owner.text)
         if isinstance(name.owner, Arrow):
             columns, single = self._of_rules(name.owner, name.state)
         else:
@@ -77,6 +81,14 @@ class Names:
                 f"; {suggest(text, self.states, 'recorded are')}" if self.states else ", and no other"
             )
         return Found(there, single)
+
+    def _given(self, name: str) -> Found | str:
+        """The columns of what an input of several numbers is given."""
+        called = (f"{name}[{number}].{GIVEN}" for number in count())
+        columns = tuple(self.states[one] for one in takewhile(self.states.__contains__, called))
+        if columns:
+            return Found(columns, False)
+        return f"what an input '{name}' is given was not recorded: neurovis run --states '{name}.{GIVEN}' records it"
 
     def _of_rules(self, wanted: Arrow, state: str) -> tuple[list[int | None], bool]:
         """The columns of a state between two ends, and whether it is the only one of two single neurons."""

@@ -24,7 +24,7 @@ from neurovis_spec.interrupts import Asked, deferred
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Probing, Runner, Stepper, ready
 from neurovis_spec.runtime.checkpoint import load_state, save_state
-from neurovis_spec.runtime.columns import Columns, Numbers, Probe, Spiking, columns_of, recording_of
+from neurovis_spec.runtime.columns import Columns, Numbers, Spiking, columns_of, recording_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied
@@ -222,7 +222,7 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
         and (course.until is None or course.until.measure.together)
     ):
         reader.leave(stepper)
-        make = _Together(hands, stepper, columns.probe, spiking, watched)
+        make = _Together(hands, stepper, columns, spiking, watched)
         size = len(network.neurons) + len(network.connections) + 1
         pace = _Pace(max(1, min(_FIRST_STEPS, _FIRST_SIZE // size)), None if watched is None else STRETCH)
     controls, origin, last = Controls(network, backend.functions), state.k, state.k + steps
@@ -336,6 +336,8 @@ class _OneByOne:
                 activity[row] = state.activity if recorded is None else state.activity[recorded]
                 if probe is not None:
                     probe.read(state, states[row], None if forming is None else forming.signals(state, before))
+                if len(columns.given):
+                    states[row, len(columns.probe.names) :] = vector[columns.given]
                 row += 1
             if body is not None:
                 try:
@@ -361,8 +363,8 @@ class _Together:
 
     hands: _Hands
     runner: Runner
-    #: what is kept of states; nothing where the runner is not a probing one
-    probe: Probe
+    #: what is kept; no states where the runner is not a probing one
+    columns: Columns
     #: whose spikes are noted, None where nobody spikes
     spiking: Spiking | None = None
     watched: Watched | None = None
@@ -386,13 +388,17 @@ class _Together:
     def _fill(self, state: State, first: int, stop: int, room: Rows) -> int:
         """Make steps, until rows are to be handed on at the latest. Gives the step behind them."""
         every, rows, reader, watch = self.hands
-        row, k = 0, first
+        row, k, own = 0, first, room
+        if len(self.columns.given):  # what is given stands beside the states, which a runner fills alone
+            own = room._replace(states=np.empty((len(room.states), len(self.columns.probe.names))))
         for part in reader.parts(first, stop):
             begin = k
             while k < begin + len(part):
                 until = min(watch.next_stop(k, begin + len(part)), k + self._most(every, room))
                 vectors = part[k - begin : until - begin]
-                made = self._run(state, vectors, room.part(slice(row, None)), every, not watch.warned)
+                made = self._run(state, vectors, own.part(slice(row, None)), every, not watch.warned)
+                if own is not room:
+                    self._put(vectors[-k % every : made : every], own, room, row)
                 row += _rows_between(k, k + made, every)
                 k += made
                 if reader.left and not watch.warned:
@@ -401,6 +407,12 @@ class _Together:
                 if rows.due() if self.watched is None else self.watched.asked():
                     return k
         return k
+
+    def _put(self, vectors: FloatArray, own: Rows, room: Rows, row: int) -> None:
+        """Put the states of some rows, and what was given in their steps, where they are kept, from a ``row`` on."""
+        rows, states = slice(row, row + len(vectors)), len(self.columns.probe.names)
+        room.states[rows, :states] = own.states[rows]
+        room.states[rows, states:] = vectors[:, self.columns.given]
 
     def _run(self, state: State, vectors: FloatArray, room: Rows, every: int, look: bool) -> int:
         """Steps, as the runner makes them, or fewer where the run is to end before."""
@@ -448,7 +460,7 @@ class _Together:
         return max(STRETCH, _MOST_SEEN // max(1, width))
 
     def _made(self, state: State, vectors: FloatArray, room: Rows, every: int, look: bool) -> int:
-        probe = self.probe
+        probe = self.columns.probe
         if self.spiking is not None and room.states.shape[1] > len(probe.names):
             probe = probe.beside(self.spiking.probe)
         if probe.names and isinstance(self.runner, Probing):

@@ -15,7 +15,7 @@ from time import monotonic
 
 import numpy as np
 
-from neurovis_spec.arrays import subscript
+from neurovis_spec.arrays import FloatArray, subscript
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.backend import ready
@@ -95,8 +95,8 @@ class Recorder:
         if self._body is not None:
             self._body.show(self._room.sensors[self._row], self._room.pose[self._row])
 
-    def end(self, state: State) -> None:
-        """After a step."""
+    def end(self, state: State, inputs: FloatArray) -> None:
+        """After a step, which was given these ``inputs``."""
         self._last = state
         if self._spiking is not None:
             self._fired.put(state.k - 1, self._spiking.now(state))
@@ -106,6 +106,7 @@ class Recorder:
             if self._columns.probe.names:
                 signals = None if self._forming is None else self._forming.signals(state, self._weights)
                 self._columns.probe.read(state, self._room.states[self._row], signals)
+            self._room.states[self._row, len(self._columns.probe.names) :] = inputs[self._columns.given]
             self._filled += 1
         if self._writer is not None and monotonic() >= self._due:
             self._hand_on()

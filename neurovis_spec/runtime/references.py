@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.names.given import given_of
 from neurovis_spec.compiler.names.state_references import (
     Holder,
     Refusal,
@@ -70,6 +71,28 @@ def find_states(network: Network, reference: str, names: Names | None = None) ->
     if reference == "all" and isinstance(names.find(reference), str):
         return all_states(network)
     return tuple(_state(network, part, names) for part in parse_sum(reference))
+
+
+def find_recorded(network: Network, reference: str, names: Names | None) -> tuple[tuple[StateOf, ...], tuple[int, ...]]:
+    """The states of a reference, as ``find_states`` gives them, and the places of what inputs are given that it names
+    (``push.given``). Raises KeyError with the nearest names."""
+    states: list[StateOf] = []
+    places: list[int] = []
+    for part in parse_sum(reference):
+        given = find_given(network, part.text)
+        if given is None:
+            states += find_states(network, part.text, names)
+        places += given or ()
+    return tuple(states), tuple(places)
+
+
+def find_given(network: Network, reference: str) -> range | None:
+    """The places of what an input is given (``push.given``, ``touch[2].given``); None for any other reference. Raises
+    KeyError."""
+    found = given_of(reference, network.input_index)
+    if isinstance(found, Refusal):
+        raise UnknownNameError(str(found))
+    return found
 
 
 def find_lasting_state(network: Network, reference: str) -> StateOf | None:

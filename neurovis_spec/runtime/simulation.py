@@ -302,7 +302,7 @@ class Simulation:
         due = self._eventful and self._controls.due(state)
         self._ended = self.after() if due else None
         if recorder is not None:
-            recorder.end(state)
+            recorder.end(state, self._stepper.vector)
         if body is not None:
             body.move(state)
         if due and self._apply(state):  # events of the next step apply now: ``weights`` are those of the next step

@@ -18,13 +18,15 @@ from neurovis_spec.language.words import VIEWS, WHOLE
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.errors import UnknownNameError
 from neurovis_spec.runtime.names import Names, names_of
-from neurovis_spec.runtime.references import find_connections, find_states
+from neurovis_spec.runtime.references import find_connections, find_given, find_states
 from neurovis_spec.scene.renderers import RendererError
 
 #: A view by its name, with ``: `` and references behind it; or {view: references}.
 View: TypeAlias = str | Mapping[str, str | Sequence[str]]
 
 _SIGNS: Final = re.compile(r"[\[\]{}'\"]")
+#: one of several numbers that an input is given: touch[2].given
+_NUMBER: Final = re.compile(r"(?<=\w)\[[0-9]+\](?=\.)")
 _APART: Final = re.compile(r"(\w+)[\s=]+(.+)", re.DOTALL)
 _WANTED = "a view, {view: references}, or several"
 
@@ -64,7 +66,7 @@ def _taken_apart(wanted: View) -> Iterator[tuple[str, list[str]]]:
     """The name of a view, and its references."""
     if isinstance(wanted, str):
         name, _, rest = wanted.partition(":")
-        if _SIGNS.search(wanted):  # as in a spec: what a reference holds has none of these
+        if _SIGNS.search(_NUMBER.sub("", wanted)):  # as in a spec: what a reference holds has none of these
             plain = ": ".join(" ".join(_SIGNS.sub(" ", part).replace(",", ", ").split()) for part in (name, rest))
             raise ViewError(f"brackets and quotes belong to no view: '{wanted}'", f"write '{plain.replace(' ,', ',')}'")
         yield name.strip(), [part.strip() for part in rest.split(",") if part.strip()]
@@ -110,7 +112,10 @@ def refusal(view: str, reference: str, curves: Sequence[Curve]) -> tuple[str, st
 def _part(network: Network, part: Part, names: Names) -> Iterator[Curve]:
     text = part.text
     output = next((one for one in network.outputs if one.name == text), None)
-    neurons = names.find(text)
+    neurons, given = names.find(text), find_given(network, text)
+    if given is not None:
+        yield from (Curve("input", place) for place in given)
+        return
     if output is not None and output.states:
         states = output.states
     elif isinstance(neurons, str) and text in network.input_index:

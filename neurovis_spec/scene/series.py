@@ -11,6 +11,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
+from neurovis_spec.compiler.names.given import GIVEN
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SYNAPSE
@@ -23,10 +24,11 @@ from neurovis_spec.scene.shown_states import ShownStates
 def values_of(curve: Curve, network: Network, recording: Recording) -> FloatArray:
     """The numbers of a curve, (rows,). Raises RecordingError where they were not recorded."""
     name = full_name(curve, network)
-    if curve.state:
+    if curve.state or curve.of == "input":
         if name not in recording.state_names:
             hint = f"record it (neurovis run --states '{name}')"
-            raise RecordingError(f"the recording does not hold the state '{name}', which the figure shows: {hint}")
+            what = "the state " if curve.state else ""
+            raise RecordingError(f"the recording does not hold {what}'{name}', which the figure shows: {hint}")
         return recording.states[:, recording.state_names.index(name)]
     try:
         return recording[name] if curve.of == "neuron" else recording.weight(name)
@@ -35,7 +37,9 @@ def values_of(curve: Curve, network: Network, recording: Recording) -> FloatArra
 
 
 def full_name(curve: Curve, network: Network) -> str:
-    """How the spec calls it: ``K1``, ``K1 -> O``, ``K1.v``, ``(K1 -> O).eligibility``."""
+    """How the spec calls it: ``K1``, ``K1 -> O``, ``K1.v``, ``(K1 -> O).eligibility``, ``touch[2].given``."""
+    if curve.of == "input":
+        return network.given_names[curve.index]
     if curve.state:
         one = StateOf.of(curve.of, curve.state, np.array([curve.index], dtype=np.int64))
         return network.state_names([one])[0]
@@ -43,10 +47,14 @@ def full_name(curve: Curve, network: Network) -> str:
 
 
 def short_names(curves: Sequence[Curve], network: Network) -> list[tuple[str, str]]:
-    """What a picture calls each of them, and a subscript: labels of neurons, an arrow for a connection."""
+    """What a picture calls each of them, and a subscript: labels of neurons, an arrow for a connection, the name of an
+    input."""
     labels, names = parts_of(network.neurons), names_in_parts(network.neurons)
     found: list[tuple[str, str]] = []
     for curve in curves:
+        if curve.of == "input":
+            found.append((full_name(curve, network).removesuffix(f".{GIVEN}"), ""))
+            continue
         if curve.of == "connection":
             name = network.connection_names[curve.index].replace("->", "→")
             found.append((f"({name}).{curve.state}" if curve.state else name, ""))
@@ -61,19 +69,22 @@ def short_names(curves: Sequence[Curve], network: Network) -> list[tuple[str, st
 def kind_of(curves: Sequence[Curve]) -> str:
     """What they all are, in a word or two."""
     kinds = {_kind_of(curve) for curve in curves}
-    return ", ".join(kind for kind in ("activity", "weight", "signal", "state") if kind in kinds)
+    return ", ".join(kind for kind in ("activity", "weight", "signal", "state", "input") if kind in kinds)
 
 
 def _kind_of(curve: Curve) -> str:
+    if curve.of == "input":
+        return "input"
     if curve.of == "neuron":
         return "state" if curve.state else "activity"
     return {"": "weight", SYNAPSE.gives: "signal"}.get(curve.state, "state")
 
 
 def states_of(panels: Sequence[Panel], network: Network) -> tuple[str, ...]:
-    """The states that have to be recorded for these views."""
-    curves = [curve for panel in panels for curve in (panel.shown or chosen(panel.view, network)) if curve.state]
-    return tuple(dict.fromkeys(full_name(curve, network) for curve in curves))
+    """The states that have to be recorded for these views, and what inputs are given."""
+    curves = [curve for panel in panels for curve in (panel.shown or chosen(panel.view, network))]
+    recorded = (curve for curve in curves if curve.state or curve.of == "input")
+    return tuple(dict.fromkeys(full_name(curve, network) for curve in recorded))
 
 
 def chosen(view: str, network: Network) -> tuple[Curve, ...]:

@@ -87,9 +87,10 @@ class LayoutSettings:
 @dataclass(frozen=True, slots=True)
 class Curve:
     """A number of each step: the activity of a neuron, the weight of a connection, a ``state`` of the model of a neuron
-    or of a rule or the synapse of a connection. ``index`` is that of the neuron or of the connection."""
+    or of a rule or the synapse of a connection, or what an input is given. ``index`` is that of the neuron or of the
+    connection, or the place in the vector of all inputs."""
 
-    of: Literal["neuron", "connection"]
+    of: Literal["neuron", "connection", "input"]
     index: int
     state: str = ""
 

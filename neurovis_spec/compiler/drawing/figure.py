@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.names.finder import Finder
+from neurovis_spec.compiler.names.given import given_of
 from neurovis_spec.compiler.names.references import Directory, resolve_part
-from neurovis_spec.compiler.names.state_references import StateOf
-from neurovis_spec.compiler.network import Output
+from neurovis_spec.compiler.names.state_references import Refusal, StateOf
+from neurovis_spec.compiler.network import Input, Output
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.drawing import PanelModel
@@ -26,12 +27,15 @@ from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 def figure_of(
     spec: Spec,
     census: Census,
+    inputs: tuple[Input, ...],
     outputs: tuple[Output, ...],
     finder: Finder,
 ) -> tuple[Panel, ...]:
     """The views in the order written; those that are invalid are left out, and reported."""
     models = () if spec.render is None else spec.render.figure
-    reader = _Reader(census, {output.name: output for output in outputs}, frozenset(spec.outputs), finder)
+    known = {entry.name: entry for entry in inputs}
+    named = {output.name: output for output in outputs}
+    reader = _Reader(census, known, named, frozenset(spec.outputs), finder)
     panels = [reader.panel(model) for model in models]
     return tuple(panel for panel in panels if panel is not UNKNOWN)
 
@@ -39,6 +43,7 @@ def figure_of(
 @dataclass(frozen=True)
 class _Reader:
     census: Census
+    inputs: dict[str, Input]
     outputs: dict[str, Output]
     #: the names of all outputs, also of those that are invalid
     declared: frozenset[str]
@@ -80,6 +85,16 @@ class _Reader:
         """The curves of a part of a reference: a state, neurons, or an output of either; what a view cannot show is
         reported."""
         name = part.text
+        given = given_of(name, self.inputs)
+        if isinstance(given, Refusal):
+            given.report("unknown-input", text.node.at(part.start, part.end), self.finder.findings)
+            return
+        if given is not None and view == "raster":
+            self._refuse(name, text.node.at(part.start, part.end), "a raster shows neurons", "show it as traces")
+            return
+        if given is not None:
+            yield from (Curve("input", place) for place in given)
+            return
         output = self.outputs.get(name)
         known = self.directory.holds(name)
         if not known and output is None and name in self.declared:
