@@ -265,11 +265,12 @@ class CompiledNetwork(Compilation):
 
         Without ``step`` it is the last of the recording, or of a default run. Without ``recording`` the network runs
         as far as the step; ``inputs`` replace the sources of inputs, as in ``run``, and the gains are those of this
-        run. ``view`` says what is shown, from top to bottom: ``network``, ``matrix``, ``traces``, ``raster``,
-        ``weights``, alone or with references (``traces: C1, C2`` or {"traces": ["C1", "C2"]}), and ``body``; by default
-        it is the spec's ``figure``, else the network, with its body where there is one. Views over time show the whole
-        recording or run, or ``window`` steps around the one that is drawn. ``effort`` is that of ``layout``. ``dpi``
-        are the pixels of an inch, 96 of which are a picture's usual size on the screen.
+        run. ``view`` says what is shown, from top to bottom: ``network``, or its ``pathways``, a group a glyph, told
+        in sentences, too; ``matrix``, ``traces``, ``raster``, ``weights``, alone or with references (``traces: C1, C2``
+        or {"traces": ["C1", "C2"]}), and ``body``; by default it is the spec's ``figure``, else the network, with its
+        body where there is one. Views over time show the whole recording or run, or ``window`` steps around the one
+        that is drawn. ``effort`` is that of ``layout``. ``dpi`` are the pixels of an inch, 96 of which are a picture's
+        usual size on the screen.
 
         ``collapse`` names groups and instances that are one glyph each in the picture of the network, ``focus``
         neurons that are shown with all they are connected to, ``paths`` (``"A -> B"``) what the shortest paths are
@@ -306,7 +307,7 @@ class CompiledNetwork(Compilation):
 
     def needs_layout(self, view: View | Sequence[View] | None = None) -> bool:
         """Whether a picture of these views (default: the spec's ``figure``) needs the layout."""
-        return self._look(view).shows("network", "matrix")
+        return pipeline.needs_layout(self.network, self._look(view))
 
     def steps_to_draw(
         self,
@@ -323,9 +324,9 @@ class CompiledNetwork(Compilation):
 
     def _look(self, view: View | Sequence[View] | None = None) -> Look:
         """A picture of these views, as the spec has it."""
-        from neurovis_spec.scene.look import Look
+        from neurovis_spec.scene.look import Look, with_views
 
-        return Look(self.network.render, panels_of(self.network, view))
+        return with_views(Look(self.network.render), panels_of(self.network, view))
 
     def _repr_svg_(self) -> str:
         """The network at the last step of its default run, for a notebook."""
@@ -396,6 +397,12 @@ class CompiledNetwork(Compilation):
         from neurovis_spec.describe import describe
 
         return describe(self.network, self.choose_engine())
+
+    def pathways(self) -> list[str]:
+        """What runs from group to group, a sentence each, as ``neurovis inspect --pathways`` prints it."""
+        from neurovis_spec.scene.pathway_words import sentences
+
+        return sentences(self.network)
 
 
 @dataclass(frozen=True, eq=False)

@@ -276,7 +276,7 @@ def _check_picture(given: PictureKeywords) -> None:
 
 def _look_of(of: Compilation, path: Path, given: PictureKeywords) -> Look:
     """What stills and films have in common."""
-    from neurovis_spec.scene.look import Excerpt, Look, excerpted
+    from neurovis_spec.scene.look import Excerpt, Look, excerpted, with_views
 
     recording, view, least = given["recording"], given["view"], given["min_weight"]
     panels = panels_of(of.network, view, recording)
@@ -288,8 +288,8 @@ def _look_of(of: Compilation, path: Path, given: PictureKeywords) -> Look:
         arguments.truth("full", given["full"]),
     )
     settings, asked = of.settings_for(given["theme"]), view is not None or bool(of.network.render.figure)
-    look = Look(settings, panels, asked, engine=given["engine"], suffix=path.suffix.lower())
-    settings = excerpted(of.network, settings, excerpt)
+    look = with_views(Look(settings, (), asked, engine=given["engine"], suffix=path.suffix.lower()), panels)
+    settings = excerpted(of.network, look.settings, excerpt)
     return replace(look, settings=settings if look.shows("network") else replace(settings, collapse=()))
 
 

@@ -192,12 +192,19 @@ def filmed(of: Compilation, look: Look, run: Run, progress: Progress | None = No
     from neurovis_spec.scene.shots import shots_of
 
     network = of.network
-    layout = of.placed(look.engine, look.effort) if look.shows("network", "matrix") else None
+    layout = of.placed(look.engine, look.effort) if needs_layout(network, look) else None
     recording = recorded(network, run, progress)
     seen = with_body_if_any(look, recording)
     shots = shots_of(network, recording, seen)
     gains = page_gains(of, seen, run, recording)
     return lambda settings: figure(network, layout, replace(seen, settings=settings), shots, gains)
+
+
+def needs_layout(network: Network, look: Look) -> bool:
+    """Whether a picture needs the layout of the network: one of its pathways alone has its own."""
+    from neurovis_spec.scene.gathered_layout import laid_out_alone
+
+    return look.shows("matrix") or (look.shows("network") and not laid_out_alone(network, look.settings))
 
 
 def films_of(of: Compilation, look: Look, run: Run, progress: Progress | None = None) -> Iterator[Film]:
@@ -210,7 +217,8 @@ def films_of(of: Compilation, look: Look, run: Run, progress: Progress | None = 
     from neurovis_spec.scene.film import films
     from neurovis_spec.scene.shots import in_parts, shots_of, snapshots_of_run
 
-    network, layout = of.network, of.placed(look.engine, look.effort)
+    network = of.network
+    layout = of.placed(look.engine, look.effort) if needs_layout(network, look) else None
     gains = gains_by(seen_by(of, look), look, run)
     snapshots: Iterable[Snapshot]
     if isinstance(run, Recording):
@@ -241,7 +249,7 @@ def with_body_if_any(look: Look, recording: Recording) -> Look:
 
 def seen_by(of: Compilation, look: Look) -> Compilation:
     """The same network, with what the picture collapses as its own setting: gains are of what is collapsed."""
-    if look.settings.collapse == of.network.render.collapse:
+    if not look.settings.pathways and look.settings.collapse == of.network.render.collapse:
         return of
     return replace(of, network=replace(of.network, render=look.settings))
 
@@ -257,8 +265,8 @@ def page_gains(of: Compilation, look: Look, run: Run, recording: Recording) -> P
         return PageGains(None, None)
     seen = seen_by(of, look)
     each = picture = gains_by(seen, look, run, recording)
-    if look.settings.collapse and look.shows("matrix", "raster"):
-        whole = replace(seen.network, render=replace(seen.network.render, collapse=()))
+    if (look.settings.collapse or look.settings.pathways) and look.shows("matrix", "raster"):
+        whole = replace(seen.network, render=replace(seen.network.render, collapse=(), pathways=False))
         each = gains_of(whole, fitted(recording, whole))
     return PageGains(each, picture)
 

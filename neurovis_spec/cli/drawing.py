@@ -103,9 +103,9 @@ drawing_options: Final = as_one(
         metavar="V",
         multiple=True,
         shell_complete=one_of(_views),
-        help="network, matrix, traces, raster, weights or body; 'traces: C1, C2' or 'weights: K -> O' says of what. "
-        "Repeatable, from top to bottom; default: the spec's figure, else the network, with its body where there is "
-        "one.",
+        help="network, pathways (a group a glyph), matrix, traces, raster, weights or body; 'traces: C1, C2' or "
+        "'weights: K -> O' says of what. Repeatable, from top to bottom; default: the spec's figure, else the network, "
+        "with its body where there is one.",
     ),
     click.option(
         "--collapse",

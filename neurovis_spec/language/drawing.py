@@ -342,7 +342,7 @@ def _panel(node: Node, info: ValidationInfo) -> PanelModel:
     if isinstance(entry.value, Scalar) and entry.value.value is None:
         return PanelModel(name, None)
     if name.value in WHOLE:
-        message = f"nothing here: the view '{name.value}' shows the whole {name.value}"
+        message = f"nothing here: the view '{name.value}' shows {WHOLE[name.value]}"
         refuse(info, entry.value, message, f"write {name.value} alone")
     return PanelModel(name, as_reference(entry.value, info))
 
@@ -392,8 +392,8 @@ class RenderModel(Model):
     )
     figure: FigureField = Field(
         (),
-        description="The views that make up the picture, from top to bottom: network, matrix, traces, raster, weights, "
-        "body, or {traces: references} (default the network, with its body where a run has one).",
+        description="The views that make up the picture, from top to bottom: network or pathways, matrix, traces, "
+        "raster, weights, body, or {traces: references} (default the network, with its body where a run has one).",
     )
     window: FormulaField | None = Field(
         None, description="How many steps around the one that is drawn the views over time show (default all)."

@@ -27,11 +27,13 @@ METHODS: Final[Mapping[Method, str]] = {
 }
 
 #: What a picture can show.
-VIEWS = ("network", "matrix", "traces", "raster", "weights", "body")
+VIEWS = ("network", "pathways", "matrix", "traces", "raster", "weights", "body")
 #: Those over the time of a run.
 TIMED = ("traces", "raster", "weights")
-#: Those that show the whole of something, and take no references.
-WHOLE = ("network", "body")
+#: Those that show the whole of something, which takes no references, and what that is.
+WHOLE: Final[Mapping[str, str]] = {"network": "the whole network", "pathways": "all pathways", "body": "the whole body"}
+#: Those that are the picture of the network, of which a page has one.
+PICTURES: Final = ("network", "pathways")
 
 
 class Viewpoint(NamedTuple):

@@ -220,7 +220,7 @@ def view_of(
     RendererError."""
     network = compiled.network
     settings = compiled.settings_for(appearance.theme or theme)
-    drawn = gathered(network, settings.collapse)
+    drawn = gathered(network, settings.collapse, settings.pathways)
     seen = appearance.gains(gains)
     stands = laid_out(drawn, compiled.placed(engine) if layout is None else layout)
     planned = plan(drawn, stands, seen, settings)
@@ -251,7 +251,7 @@ def view_of(
 def _planned(
     stands: Layout, gains: Gains, settings: RenderSettings, network: Network, narrowest: float
 ) -> tuple[Gathered, Plan]:
-    drawn = gathered(network, settings.collapse)
+    drawn = gathered(network, settings.collapse, settings.pathways)
     return drawn, plan(drawn, stands, gains, settings, narrowest=narrowest)
 
 

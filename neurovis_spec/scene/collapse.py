@@ -4,6 +4,9 @@ In: a network and what of it is collapsed. Out: a Gathered: a network to be draw
 activity is the mean of those that it holds, and all that runs from one glyph, or neuron, to another is one connection
 (a bundle): its weight is the sum of their weights, whatever their delays and rules, its signal the sum of their
 signals. What runs within a glyph is not drawn. The network is drawn, never run.
+
+Of pathways each group is a glyph, what runs within it is drawn as well, and what excites and what inhibits are two
+lines (``pathways``), which the sum of both would hide.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from neurovis_spec.compiler.network import Connections, Group, Instance, Network
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.ends import EndArray, ends_of
 from neurovis_spec.scene.lesions import lesions_of
+from neurovis_spec.scene.pathways import Strand, pathways
 from neurovis_spec.scene.reached import Reached, largest_signals, reached, reached_by
 from neurovis_spec.scene.shown_states import ShownStates
 from neurovis_spec.scene.signals import Signal, Signals, weights_of
@@ -59,6 +63,8 @@ class Gathered:
     counts: IntArray
     glyph: tuple[bool, ...]
     sheaf: tuple[bool, ...]
+    #: of each line, where pathways are drawn, else None
+    strands: tuple[Strand, ...] | None = None
 
     @property
     def any(self) -> bool:
@@ -162,15 +168,20 @@ def _added(values: FloatArray, to: IntArray, count: int) -> FloatArray:
     return result
 
 
-def gathered(network: Network, collapse: Sequence[tuple[str, tuple[int, ...]]]) -> Gathered:
-    """A network with these neurons, by name, as one glyph each; no neuron is in two."""
+def gathered(network: Network, collapse: Sequence[tuple[str, tuple[int, ...]]], pathways: bool = False) -> Gathered:
+    """A network with these neurons, by name, as one glyph each; no neuron is in two. Of ``pathways`` the rest of each
+    group is one, too."""
     collapse = _by_instance(network, collapse)
-    if not collapse:
+    if pathways:
+        taken = {index for _, members in collapse for index in members}
+        rest = [(group.name, tuple(set(group.indices) - taken)) for group in network.neurons.groups]
+        collapse += [(name, tuple(sorted(members))) for name, members in rest if len(members) > 1]
+    elif not collapse:
         ones = np.ones(len(network.neurons), np.int64), np.ones(len(network.connections), np.int64)
         here = np.arange(len(network.neurons)), np.arange(len(network.connections))
         plain = (False,) * len(network.neurons), (False,) * len(network.connections)
         return Gathered(network, network, *here, *ones, *plain)
-    return _Gatherer(network, collapse).gathered()
+    return _Gatherer(network, collapse, pathways).gathered()
 
 
 def _by_instance(
@@ -187,7 +198,7 @@ def _by_instance(
 class _Gatherer:
     """Makes the network that is drawn, part by part."""
 
-    def __init__(self, network: Network, collapse: Sequence[tuple[str, tuple[int, ...]]]) -> None:
+    def __init__(self, network: Network, collapse: Sequence[tuple[str, tuple[int, ...]]], as_pathways: bool) -> None:
         self.whole = network
         owner = np.full(len(network.neurons), -1, np.int64)
         for number, (_, members) in enumerate(collapse):
@@ -201,21 +212,31 @@ class _Gatherer:
             self.members[unit].append(index)
         self.sources = self.unit[network.connections.sources.whole()].tolist()
         self.targets = self.unit[network.connections.targets.whole()].tolist()
-        self.bundles: list[list[int]] = []
+        self.strands: tuple[Strand, ...] | None = None
+        if as_pathways:
+            self.strands = tuple(strand for one in pathways(network, groups=self.unit) for strand in one.strands)
+        self.bundles = self._bundles() if self.strands is None else [one.members.tolist() for one in self.strands]
         self.bundle = np.full(len(network.connections), -1, np.int64)
+        for place, own in enumerate(self.bundles):
+            self.bundle[own] = place
+        self.sheaf = tuple(
+            as_pathways or self.sources[own[0]] in self.glyphs or self.targets[own[0]] in self.glyphs
+            for own in self.bundles
+        )
+
+    def _bundles(self) -> list[list[int]]:
+        """The connections that are one line each: all from one glyph, or neuron, to another."""
+        bundles: list[list[int]] = []
         found: dict[tuple[int, int], int] = {}
         for index, ends in enumerate(zip(self.sources, self.targets, strict=True)):
             joined = ends[0] in self.glyphs or ends[1] in self.glyphs
             if joined and ends[0] == ends[1]:
                 continue
-            place = found.setdefault(ends, len(self.bundles)) if joined else len(self.bundles)
-            if place == len(self.bundles):
-                self.bundles.append([])
-            self.bundles[place].append(index)
-            self.bundle[index] = place
-        self.sheaf = tuple(
-            self.sources[own[0]] in self.glyphs or self.targets[own[0]] in self.glyphs for own in self.bundles
-        )
+            place = found.setdefault(ends, len(bundles)) if joined else len(bundles)
+            if place == len(bundles):
+                bundles.append([])
+            bundles[place].append(index)
+        return bundles
 
     def gathered(self) -> Gathered:
         """The whole, and what is drawn in its place."""
@@ -238,16 +259,19 @@ class _Gatherer:
             numbering=None,
         )
         network.__dict__["changing"] = np.unique(self._bundles_of(whole.changing))
-        ends = zip(network.connections.sources.tolist(), network.connections.targets.tolist(), strict=True)
-        names = network.neurons.names
-        network.__dict__["connection_names"] = tuple(
-            f"{names[a]} -> {names[b]}" if joined else whole.connection_names[own[0]]
-            for (a, b), own, joined in zip(ends, self.bundles, self.sheaf, strict=True)
-        )
+        if self.strands is None:
+            network.__dict__["connection_names"] = tuple(self._names(network))
         sizes = np.array([len(own) for own in self.members], np.int64)
         counts = np.array([len(own) for own in self.bundles], np.int64)
         glyph = tuple(unit in self.glyphs for unit in range(len(self.members)))
-        return Gathered(whole, network, self.unit, self.bundle, sizes, counts, glyph, self.sheaf)
+        return Gathered(whole, network, self.unit, self.bundle, sizes, counts, glyph, self.sheaf, self.strands)
+
+    def _names(self, network: Network) -> Iterator[str]:
+        """What the lines of what is drawn are called: those that are connections of the whole as these are."""
+        names, ends = network.neurons.names, network.connections
+        sources, targets = ends.sources.tolist(), ends.targets.tolist()
+        for a, b, own, joined in zip(sources, targets, self.bundles, self.sheaf, strict=True):
+            yield f"{names[a]} -> {names[b]}" if joined else self.whole.connection_names[own[0]]
 
     def _whole_units(self, indices: Iterable[int]) -> list[int]:
         """The units of which these neurons are all the members, in order."""
@@ -272,7 +296,7 @@ class _Gatherer:
                 while name in taken:  # a group may be called like a neuron of another
                     name += "*"
                 names.append(name)
-                labels.append(name)
+                labels.append(name if self.strands is None else name.rpartition(".")[2])
                 groups.append(self._glyph(unit, name, [neurons.groups[group_of[index]] for index in own]))
                 continue
             names.append(neurons.names[own[0]])
@@ -299,7 +323,7 @@ class _Gatherer:
         held = [neurons.names[index] for index in own]
         words = ", ".join(held if len(held) <= _NAMED else [*held[: _NAMED - 1], "…", held[-1]])
         within = sum(a == b == unit for a, b in zip(self.sources, self.targets, strict=True))
-        lines = f"\n{within:,} connections within" if within else ""
+        lines = f"\n{within:,} connections within" if within and self.strands is None else ""
         boxes = {group.box for group in groups}
         box = boxes.pop() if len(boxes) == 1 else None
         if box is not None:

@@ -60,7 +60,6 @@ def figure(network: Network, layout: Layout | None, look: Look, shots: Shots, ga
     """The picture of some steps of a run, a frame for each of ``shots.frames``: its views one below the other, or the
     network alone. Raises RecordingError where the recording lacks what they show, KeyError for an unknown theme."""
     if not look.panels:
-        assert layout is not None
         assert gains.picture is not None
         return film(network, layout, shots.snapshots(network), gains.picture, look.settings, look.fps or 1.0)
     settings = look.settings
@@ -71,7 +70,6 @@ def figure(network: Network, layout: Layout | None, look: Look, shots: Shots, ga
     head = HEADER + _TOP if title is not None else _TOP
     picture, sheet, blocks = None, _sheet(settings), list(others.values())
     if look.shows("network"):
-        assert layout is not None
         assert gains.picture is not None
         own, narrowest = _beside(settings, blocks, head), PAGE if others else 0.0
         picture = film(network, layout, shots.snapshots(network), gains.picture, own, look.fps or 1.0, narrowest)
@@ -122,8 +120,7 @@ def with_body(picture: Film, poses: Poses) -> Film:
     height = whole(top + part.height + _FOOT)
     words = picture.caption, picture.captions, picture.titles
     page = Page(scene.width, height, scene.density, scene.theme, scene.title, picture.fps, *words)
-    made = stacked(page, [(0.0, Part(scene.groups, scene.height)), (top, part)], picture)
-    return replace(made, scene=replace(made.scene, notes=scene.notes))
+    return stacked(page, [(0.0, Part(scene.groups, scene.height)), (top, part)], picture)
 
 
 def _captions(network: Network, shots: Shots) -> list[str]:

@@ -37,6 +37,7 @@ from neurovis_spec.scene.model import (
     ended,
     shifted,
 )
+from neurovis_spec.scene.pathway_words import told
 from neurovis_spec.scene.plan import Plan, plan
 from neurovis_spec.scene.themes import colours, readable
 
@@ -54,7 +55,7 @@ def scene_of_step(
 
 def film(
     network: Network,
-    layout: Layout,
+    layout: Layout | None,
     snapshots: Collection[Snapshot],
     gains: Gains,
     settings: RenderSettings,
@@ -68,7 +69,7 @@ def film(
 
 def films(
     network: Network,
-    layout: Layout,
+    layout: Layout | None,
     parts: Iterable[Collection[Snapshot]],
     gains: Gains,
     settings: RenderSettings,
@@ -76,8 +77,9 @@ def films(
     narrowest: float = 0.0,
 ) -> Iterator[Film]:
     """The same for a film that comes in parts, each made when it is asked for. What stays the same is planned anew only
-    where other weights are reached. Raises ValueError for a part without a snapshot."""
-    drawn = gathered(network, settings.collapse)
+    where other weights are reached. Of pathways that are ``laid_out_alone`` the layout may be None. Raises ValueError
+    for a part without a snapshot."""
+    drawn = gathered(network, settings.collapse, settings.pathways)
     placed, planned, reached = laid_out(drawn, layout), None, np.zeros(0)
     for snapshots in parts:
         if not len(snapshots):
@@ -118,7 +120,9 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
     first = Looks(fill_values[0], line_values[0], widths[0], glows[0], ends[0])
     tips = tooltips(network, gains, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
     return Film(
-        scene=paint(planned, first, glowing, captions[0], tips, steps[0]),
+        scene=replace(
+            paint(planned, first, glowing, captions[0], tips, steps[0]), told=told(drawn, low[1], high[1], ends)
+        ),
         fps=fps,
         fills=tuple(f"n{index}" for index in range(len(network.neurons))),
         lines=tuple(f"c{index}" for index in range(len(network.connections))),

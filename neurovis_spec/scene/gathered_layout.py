@@ -2,7 +2,8 @@
 
 In: a Gathered, the layout of the whole. Out: the layout of what is drawn. All keep their places to each other; where
 everything is far apart it moves closer together. Where discs would touch, all is laid out anew, mirrored pairs
-mirrored.
+mirrored; so are pathways, but for those of a network that its author has placed: they have to be far enough from each
+other that there is room for what stands beside their lines.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import math
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Instance, Network
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import snap
@@ -24,8 +26,8 @@ _GROWTH, _LARGEST = 0.5, 3.0
 #: More square units than this a disc are much, for so many discs at most; all is laid out anew where that takes so many
 #: times less.
 _AREA, _MOST_ANEW, _SPARSER = 8.0, 300, 1.5
-#: Between the rims of any two discs at least, and where all move closer together, in layout units.
-_LEAST, _CLOSE = 0.15, 1.2
+#: Between the rims of any two discs at least, where all move closer together, and of pathways, in layout units.
+_LEAST, _CLOSE, _TEXT = 0.15, 1.2, 1.2
 
 
 def radius_of(size: int) -> float:
@@ -37,13 +39,22 @@ def radius_of(size: int) -> float:
     return RADIUS * min(_LARGEST, 1 + _GROWTH * math.log10(max(size, 1)))
 
 
-def laid_out(drawn: Gathered, layout: Layout) -> Layout:
-    """The layout of what is drawn in place of the whole."""
+def laid_out_alone(network: Network, settings: RenderSettings) -> bool:
+    """Whether what is drawn is laid out whatever the layout of the whole is: pathways, unless the author says where
+    neurons are."""
+    return settings.pathways and not _placed(network)
+
+
+def laid_out(drawn: Gathered, layout: Layout | None) -> Layout:
+    """The layout of what is drawn in place of the whole, which has this layout; None where it does not matter."""
+    radii = np.array([radius_of(size) for size in drawn.sizes.tolist()])
+    if drawn.strands is not None and not _placed(drawn.whole):
+        return _anew(drawn, float(radii.max()) / RADIUS)
+    assert layout is not None
     if not drawn.any:
         return layout
     places = np.array([layout.positions[name] for name in drawn.whole.neurons.names], float)
     centres = np.stack([drawn.mean(places[:, axis]) for axis in (0, 1)], axis=1)
-    radii = np.array([radius_of(size) for size in drawn.sizes.tolist()])
     scale = _scale(centres, radii)
     if scale is None or _sparse(scale * centres):
         spacing = max(1.0, 2 * float(radii.max()) + _LEAST)
@@ -66,6 +77,28 @@ def laid_out(drawn: Gathered, layout: Layout) -> Layout:
             kept[name] = (found.positions[names[a]], *kept[name][1:-1], found.positions[names[b]])
     labels = {name: side for name, side in layout.labels.items() if name in found.positions}
     return Layout(found.network, layout.engine, found.positions, {**found.routes, **kept}, labels)
+
+
+def _anew(drawn: Gathered, larger: float) -> Layout:
+    """Pathways laid out among discs that are all so many times as large as neurons: as if all else were smaller."""
+    spacing = max(1.0, 2 * RADIUS + _TEXT / larger)
+    found = lay_out_problem(_problem(drawn, {}, spacing))
+    positions = {name: _times(point, larger) for name, point in found.positions.items()}
+    routes = {name: tuple(_times(point, larger) for point in route) for name, route in found.routes.items()}
+    return Layout(found.network, found.engine, positions, routes)
+
+
+def _times(point: Point, factor: float) -> Point:
+    return snap(factor * point[0]), snap(factor * point[1])
+
+
+def _placed(network: Network) -> bool:
+    """Whether its author says where neurons are."""
+    return (
+        bool(network.layout.positions)
+        or network.layout.file is not None
+        or bool(np.isfinite(network.neurons.position).any())
+    )
 
 
 def _sparse(places: FloatArray) -> bool:

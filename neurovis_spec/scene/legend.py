@@ -54,6 +54,8 @@ class Contents:
     unit: str = "s"
     #: from where neurons in space are seen, '' where all are in a plane
     seen: str = ""
+    #: whether texts beside lines say what pathways hold
+    pathways: bool = False
 
 
 def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = False) -> list[LegendEntry]:
@@ -79,6 +81,8 @@ def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = Fal
         result.append(_size(contents.seen, theme))
     if contents.lesions:
         result.append(_faint(theme))
+    if contents.pathways:
+        result.append(_beside(theme))
     return result
 
 
@@ -217,6 +221,18 @@ def _size(seen: str, theme: Theme) -> LegendEntry:
     discs = [Disc((7 + 17.0 * place, SAMPLE_Y), size, fill, theme.ring, 0.8) for place, size in enumerate(sizes)]
     words = [Text((0, FIRST_Y), first, SMALL, theme.muted), Text((0, SECOND_Y), second, SMALL, theme.muted)]
     return LegendEntry((heading("Size", theme), *discs, *words), across)
+
+
+def _beside(theme: Theme) -> LegendEntry:
+    """What stands beside the lines of pathways."""
+    sample, first, second = "8 · Σ 2.5", "connections · sum of", "weights (· delay · rule)"
+    across = max(texts.width(each, SMALL) for each in (sample, first, second))
+    words = (
+        (SAMPLE_Y + 0.35 * SMALL, sample, theme.ink),
+        (FIRST_Y, first, theme.muted),
+        (SECOND_Y, second, theme.muted),
+    )
+    return LegendEntry((heading("Pathway", theme), *(Text((0, y), said, SMALL, ink) for y, said, ink in words)), across)
 
 
 def _faint(theme: Theme) -> LegendEntry:

@@ -1,8 +1,8 @@
-"""Labels of connections: what an author calls an entry, once beside one of its lines.
+"""Labels of connections: what an author calls an entry, once beside one of its lines; what pathways hold.
 
-In: lines, the labels of entries, what is in the way. Out: a Text for each entry that has a label and room for it. Of
+In: lines, the labels of entries, what is said of pathways, what is in the way. Out: a Text for each that has room. Of
 several lines, and of several places on each, the one is taken where the text covers least; no text stands on a disc or
-on another.
+on another. Of what there is no room for less is said where less can be.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from neurovis_spec.layout.model import Point
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.geometry import point_at
 from neurovis_spec.scene.lines import Line
-from neurovis_spec.scene.model import Text, Theme
+from neurovis_spec.scene.model import Rectangle, Shape, Text, Theme
 from neurovis_spec.scene.obstacles import Obstacles
 
 _SIZE, _WEIGHT = 10.0, 400
@@ -43,19 +43,39 @@ def line_labels(
     for entry, label in enumerate(connections.labels):
         if label and entry in wanted:
             text = texts.shorten(label, _SIZE, _WIDEST, _WEIGHT)
-            place = _best([lines[index] for index in _some(wanted[entry])], text, obstacles, picture)
-            if place is not None:
-                obstacles.add_text(_rect(place, text))
-                result[connections.entries[entry]] = Text(
-                    (place[0], place[1] + 0.35 * _SIZE),
-                    text,
-                    _SIZE,
-                    theme.ink,
-                    "middle",
-                    _WEIGHT,
-                    halo=theme.background,
-                )
+            found = _placed([lines[index] for index in _some(wanted[entry])], (text,), obstacles, theme, picture)
+            if found is not None:
+                result[connections.entries[entry]] = found
     return result
+
+
+def pathway_labels(
+    said: Mapping[str, tuple[Line, Sequence[str]]], obstacles: Obstacles, theme: Theme, picture: Rect
+) -> dict[str, Text]:
+    """The texts of pathways by their names, those that matter most first: ``said`` has the line of each, and its text,
+    the longest wording first. The room that each takes is added to ``obstacles``."""
+    found = {name: _placed([line], words, obstacles, theme, picture) for name, (line, words) in said.items()}
+    return {name: text for name, text in found.items() if text is not None}
+
+
+def backed(text: Text) -> tuple[Shape, ...]:
+    """A text on a ground of its own, so that its line does not run between its words."""
+    wide, high = texts.width(text.text, text.size, text.weight), text.size
+    (x, y), ground = text.point, text.halo
+    return Rectangle((x - wide / 2 - 1, y - 0.85 * high), wide + 2, 1.15 * high, 2.0, ground, ground, 0.0), text
+
+
+def _placed(
+    lines: Sequence[Line], wordings: Sequence[str], obstacles: Obstacles, theme: Theme, picture: Rect
+) -> Text | None:
+    """The first of these texts that has room on one of the lines; None where none has."""
+    for text in wordings:
+        place = _best(lines, text, obstacles, picture)
+        if place is not None:
+            obstacles.add_text(_rect(place, text))
+            at = (place[0], place[1] + 0.35 * _SIZE)
+            return Text(at, text, _SIZE, theme.ink, "middle", _WEIGHT, halo=theme.background)
+    return None
 
 
 def _some(members: Sequence[int]) -> Sequence[int]:

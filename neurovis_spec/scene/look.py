@@ -62,6 +62,16 @@ class Look:
         return "network" in views if not self.panels else any(panel.view in views for panel in self.panels)
 
 
+def with_views(look: Look, panels: tuple[Panel, ...]) -> Look:
+    """A look with these views: pathways are a picture of the network with each group as one glyph. What its author
+    finds too weak to be drawn is of connections, not of these."""
+    if not any(panel.view == "pathways" for panel in panels):
+        return replace(look, panels=panels)
+    settings = replace(look.settings, pathways=True, min_weight=None)
+    panels = tuple(Panel("network") if panel.view == "pathways" else panel for panel in panels)
+    return replace(look, settings=settings, panels=panels if len(panels) > 1 else ())
+
+
 @dataclass(frozen=True, slots=True)
 class Excerpt:
     """What of a network a reader asks to see, as texts. ``collapse``: groups and instances that are one glyph each;

@@ -233,6 +233,8 @@ class Scene:
     density: float = 1.0
     #: what the picture leaves out, as it says itself
     notes: tuple[str, ...] = ()
+    #: what it shows, in sentences, for those who do not see it
+    told: tuple[str, ...] = ()
 
     @property
     def pixels(self) -> tuple[int, int]:

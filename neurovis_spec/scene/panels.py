@@ -14,7 +14,7 @@ from neurovis_spec import arguments
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.references import Part, Sum, parse, state_of
-from neurovis_spec.language.words import VIEWS, WHOLE
+from neurovis_spec.language.words import PICTURES, VIEWS, WHOLE
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.errors import UnknownNameError
 from neurovis_spec.runtime.names import Names, names_of
@@ -45,7 +45,10 @@ def panels_of(network: Network, wanted: View | Sequence[View] | None) -> tuple[P
     else:
         views = [wanted] if isinstance(wanted, (str, Mapping)) else arguments.several("view", wanted, _WANTED)
         panels = tuple(panel for view in views for panel in _one(network, own, view))
-    return () if [panel.view for panel in panels] == ["network"] else panels
+    views = [panel.view for panel in panels]
+    if views.count("network") and views.count("pathways"):
+        raise ViewError("a page has the network once", f"take {' or '.join(map(repr, PICTURES))}")
+    return () if views == ["network"] else panels
 
 
 def _one(network: Network, own: Sequence[Panel], wanted: View) -> Iterator[Panel]:
@@ -53,7 +56,7 @@ def _one(network: Network, own: Sequence[Panel], wanted: View) -> Iterator[Panel
         if name not in VIEWS:
             raise ViewError(f"there is no view '{name}'", _colon(name) or suggest(name, VIEWS, "views"))
         if references and name in WHOLE:
-            raise ViewError(f"the view '{name}' shows the whole {name}: it takes no references")
+            raise ViewError(f"the view '{name}' shows {WHOLE[name]}: it takes no references")
         named = [panel for panel in own if panel.view == name and panel.shown is not None]
         if references:
             curves = [curve for reference in references for curve in curves_of(network, name, reference)]

@@ -83,7 +83,15 @@ def stacked(page: Page, parts: Sequence[tuple[float, Part]], network: Film | Non
 
     return replace(
         base,
-        scene=Scene(page.width, page.height, page.theme, page.title, tuple(groups), page.density, base.scene.notes),
+        scene=replace(
+            base.scene,
+            width=page.width,
+            height=page.height,
+            theme=page.theme,
+            title=page.title,
+            groups=tuple(groups),
+            density=page.density,
+        ),
         fps=page.fps,
         fills=(*base.fills, *(name for one in changes for name in one.fills)),
         fill_values=side_by_side([base.fill_values, *(one.fill_values for one in changes)]),

@@ -73,11 +73,16 @@ def group_of(network: Network) -> IntArray:
     return np.repeat(np.arange(len(groups)), [group.count for group in groups])
 
 
-def numbered(network: Network) -> IntArray:
+def numbered(network: Network, groups: IntArray | None = None) -> IntArray:
     """Of each connection the number of its pathway (m,): that of the group that it comes from times how many groups
-    there are, and that of the group that it goes to."""
-    ends, group = network.connections, group_of(network)
-    return group[ends.sources.whole()] * len(network.neurons.groups) + group[ends.targets.whole()]
+    there are, and that of the group that it goes to. ``groups`` (n,) has the group of each neuron, by default its
+    own."""
+    ends, group = network.connections, group_of(network) if groups is None else groups
+    return group[ends.sources.whole()] * _count(group) + group[ends.targets.whole()]
+
+
+def _count(groups: IntArray) -> int:
+    return int(groups.max(initial=0)) + 1
 
 
 def pathways(
@@ -86,23 +91,25 @@ def pathways(
     weights: FloatArray | None = None,
     ends: EndArray | None = None,
     counts: IntArray | None = None,
+    groups: IntArray | None = None,
 ) -> tuple[Pathway, ...]:
     """The pathways of a network, or of ``some`` of its connections (m,), by source and then by target.
 
     ``weights`` (m,) are by default those at first, ``ends`` (m,) how lines end with these, and ``counts`` (m,) how many
-    connections each stands for (of a network in which something is collapsed), else one.
+    connections each stands for (of a network in which something is collapsed), else one; ``groups`` (n,) the group of
+    each neuron, by default its own: ``source`` and ``target`` are numbers of these.
     """
     connections = network.connections
     weights = connections.weights.whole() if weights is None else weights
     ends = ends_of(network, weights) if ends is None else ends
     counts = np.ones(len(connections), np.int64) if counts is None else counts
     chosen = np.arange(len(connections)) if some is None else np.flatnonzero(some)
-    number = numbered(network)[chosen]
+    groups = group_of(network) if groups is None else groups
+    number = numbered(network, groups)[chosen]
     order = np.lexsort((1 - ends[chosen] + 3 * (ends[chosen] == 0), number))  # 1, −1, 0
     chosen, number = chosen[order], number[order]
-    groups = len(network.neurons.groups)
     return tuple(
-        _made(network, divmod(int(number[own.start]), groups), chosen[own], weights, ends, counts)
+        _made(network, divmod(int(number[own.start]), _count(groups)), chosen[own], weights, ends, counts)
         for own in _runs(number)
     )
 

@@ -43,10 +43,11 @@ from neurovis_spec.scene.labels import (
 )
 from neurovis_spec.scene.legend_scales import LegendEntry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
-from neurovis_spec.scene.line_labels import line_labels
+from neurovis_spec.scene.line_labels import backed, line_labels, pathway_labels
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Shape, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
+from neurovis_spec.scene.pathway_words import PathwayWords
 from neurovis_spec.scene.scaling import scaled, scaled_group
 from neurovis_spec.scene.shown import Shown, shown
 from neurovis_spec.scene.signals import Signals
@@ -155,7 +156,10 @@ def plan(
         labels=tuple(raised(said.labels, sizes)),
         back=(*_box_frames(page.boxes, frame, theme), *_dotted_groups(content, page, theme)),
         front=(
-            *(Group((text,), id=f"label:{entry}") for entry, text in said.lines.items()),
+            *(
+                Group(backed(text) if content.said else (text,), id=f"label:{entry}")
+                for entry, text in said.lines.items()
+            ),
             *(Group((said.titles[index],), id=f"title:{page.boxes[index].path}") for index in sorted(said.titles)),
             *framed.around(content.notes, theme),
         ),
@@ -188,6 +192,8 @@ class _Content:
     signals: str
     ends: legend.Ends
     notes: tuple[str, ...]
+    #: of pathways, what stands beside each line, the most words first
+    said: Sequence[Sequence[str]]
     extent: Rect
     #: (n,) how near neurons in space are, None where all are in a plane
     near: FloatArray | None
@@ -208,6 +214,7 @@ def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights:
     beside = [(index, reach) for index, reach in beside if index not in rooms]
     extent = _extent(positions, radii, routes, boxes, beside, rooms.values())
     lesions, signals, ends = lesions_of(network), Signals(drawn.whole).called, _ends(drawn)
+    words = PathwayWords(drawn.whole)
     return _Content(
         network=network,
         positions=positions,
@@ -222,6 +229,7 @@ def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights:
         signals=signals,
         ends=ends,
         notes=notes,
+        said=[words.beside(strand) for strand in drawn.strands or ()],
         extent=extent,
         near=near,
     )
@@ -287,7 +295,12 @@ def _texts(content: _Content, page: _OnPage, settings: RenderSettings, sizes: Ma
     if settings.labels:
         hidden = (~content.seen.focus).tolist()
         labels = labels_of(network, _ground(content, page), obstacles, hidden, sizes, content.sides)
-        lines = line_labels(network, page.lines, obstacles, theme, page.picture)
+        if content.said:
+            strongest = np.argsort(-np.abs(network.connections.weights.whole()), kind="stable").tolist()
+            told = {network.connection_names[k]: (page.lines[k], content.said[k]) for k in strongest if k in page.lines}
+            lines = pathway_labels(told, obstacles, theme, page.picture)
+        else:
+            lines = line_labels(network, page.lines, obstacles, theme, page.picture)
     left = [index for index in range(len(boxes)) if index not in titles]
     unsaid = {titled[index].computes for index, text in titles.items() if text.text != boxes[index].title}
     others = elsewhere([titled[index] for index in left], obstacles, theme, unsaid)
@@ -509,6 +522,7 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
             sent_traces=_least_and_most(told_times(network, sent_seconds_of(network))),
             unit=network.dt_unit,
             seen="" if content.near is None else called(network.layout.view),
+            pathways=bool(content.said) and settings.labels,
         )
         for brief in (False, True):
             items = legend.entries(contents, gains, theme, brief=brief)

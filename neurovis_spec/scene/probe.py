@@ -55,7 +55,7 @@ def _is_for_all(stated: Collection[StatedGain], count: int) -> bool:
 def probe(network: Network, made: Recording | None = None) -> Gains:
     """The gains of a network: what its spec states, else from the peaks of its default run. Where this is ``made``, as
     far as they need it or further, it is not run again."""
-    steps, drawn = probe_steps(network), gathered(network, network.render.collapse)
+    steps, drawn = probe_steps(network), gathered(network, network.render.collapse, network.render.pathways)
     if not steps:
         return choose_gains(drawn.network, drawn.network.render, nothing(drawn.network))
     if made is None:
@@ -84,7 +84,7 @@ def _warn_of_stiffness(network: Network, made: Recording) -> None:
 def gains_of(network: Network, recording: Recording) -> Gains:
     """The gains for a recording: what the spec states, else from all of its steps, so that each looks the same. Raises
     RecordingError for a partial one."""
-    drawn = gathered(network, network.render.collapse)
+    drawn = gathered(network, network.render.collapse, network.render.pathways)
     reached = drawn.reached(recording)
     return choose_gains(
         drawn.network, drawn.network.render, reached if probe_steps(network) else nothing(drawn.network)

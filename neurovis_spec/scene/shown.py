@@ -72,7 +72,7 @@ def shown(network: Network, settings: RenderSettings, weights: FloatArray, lengt
         few = lines & (weights < settings.min_weight)
         if few.any():
             least = texts.number(settings.min_weight)
-            notes.append(f"{_left_out(int(few.sum()), int(lines.sum()))}: those with |w| < {least}")
+            notes.append(f"{_left_out(int(few.sum()), int(lines.sum()), settings.pathways)}: those with |w| < {least}")
         lines = lines & ~few
     most = _most(network, settings)
     if most is not None and int(lines.sum()) > most:
@@ -112,8 +112,8 @@ def _most(network: Network, settings: RenderSettings) -> int | None:
     )
 
 
-def _left_out(count: int, of: int) -> str:
-    return f"{count:,} of {of:,} connections are left out"
+def _left_out(count: int, of: int, pathways: bool = False) -> str:
+    return f"{count:,} of {of:,} {'pathways' if pathways else 'connections'} are left out"
 
 
 def _thinned_out(network: Network, before: BoolArray, lines: BoolArray, why: str) -> list[str]:

@@ -218,10 +218,11 @@ def document(scene: Scene, body: str, style: str = "", attributes: Mapping[str, 
     across, down = scene.pixels
     families = ",".join(f"'{name}'" if " " in name else name for name in FAMILIES)
     more = "".join(f" {key}={quoted(value)}" for key, value in (attributes or {}).items())
+    told = f"<desc>{escape(chr(10).join(scene.told))}</desc>\n" if scene.told else ""
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{across}" height="{down}" '
         f'role="img" fill="none" font-family="{families}" text-rendering="geometricPrecision"{more}>\n'
-        f"<title>{escape(scene.title)}</title>\n{style}"
+        f"<title>{escape(scene.title)}</title>\n{told}{style}"
         f'<rect width="{width}" height="{height}" fill="{scene.theme.background}"/>\n{body}</svg>\n'
     ).encode()
 

@@ -163,6 +163,8 @@ class RenderSettings:
     window: int | None = None
     #: what is drawn as one glyph each: its name, its neurons
     collapse: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    #: whether each group is drawn as one glyph, and what runs from one to another as a line that says what it holds
+    pathways: bool = False
     #: connections with less are left out
     min_weight: float | None = None
     #: whether all connections are drawn, however many there are

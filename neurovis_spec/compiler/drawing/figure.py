@@ -22,6 +22,7 @@ from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Part, Sum, parse
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
+from neurovis_spec.language.words import PICTURES
 
 
 def figure_of(
@@ -37,6 +38,10 @@ def figure_of(
     named = {output.name: output for output in outputs}
     reader = _Reader(census, known, named, frozenset(spec.outputs), finder)
     panels = [reader.panel(model) for model in models]
+    pictures = {model.view.value: model.view.span for model in models if model.view.value in PICTURES}
+    if len(pictures) > 1:
+        span, names = list(pictures.values())[1], " or ".join(f"'{name}'" for name in pictures)
+        finder.findings.error("bad-view", span, "a page has the network once", f"take {names}")
     return tuple(panel for panel in panels if panel is not UNKNOWN)
 
 
