@@ -200,6 +200,7 @@ def settings_for(network: Network, given: str = "plain", **more: object) -> Body
             moved("lift[1]", "both1 - 2 * both0 + pi * dt", both0=(outputs["both"], 0), both1=(outputs["both"], 1)),
         ),
         each_episode=True,
+        sensors={port.name: port.numbers for port in Cart.sensors},
     )
     return replace(settings, **more)  # type: ignore[arg-type]
 

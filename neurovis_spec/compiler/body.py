@@ -83,7 +83,8 @@ def body_settings(
     each_episode = model.reset is not None and model.reset.value == "each_episode"
     if given is None or substeps is UNKNOWN:
         return None
-    return BodySettings(kind, given.value, path, substeps, sensed, moved, each_episode)
+    sensors = {} if body is None else {port.name: port.numbers for port in body.sensors}
+    return BodySettings(kind, given.value, path, substeps, sensed, moved, each_episode, sensors)
 
 
 def find_body(

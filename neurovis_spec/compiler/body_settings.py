@@ -5,7 +5,8 @@ In: nothing; these are values of the Network. Out: BodySettings, which ``compile
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from neurovis_spec.language.expressions.tree import Tree
@@ -38,7 +39,8 @@ class Moved:
 @dataclass(frozen=True, slots=True)
 class BodySettings:
     """A body of a ``kind`` (an entry point's name), opened with what the spec gives (``given``, and ``path`` where that
-    is a file). ``each_episode``: it is reset where an episode ends."""
+    is a file). ``each_episode``: it is reset where an episode ends. ``sensors``: for each sensor what its numbers are
+    called, ``name`` or ``name[i]``; none where the body could not be opened."""
 
     kind: str
     given: str
@@ -47,3 +49,4 @@ class BodySettings:
     sensed: tuple[Sensed, ...]
     moved: tuple[Moved, ...]
     each_episode: bool
+    sensors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)

@@ -18,6 +18,7 @@ from typing import Final, Literal
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SPIKE
@@ -63,14 +64,17 @@ class Measure:
     groups: Mapping[str, IntArray]
     #: for each parameter its slot, the index of its value
     slots: Mapping[str, int]
-    #: for each state its column among those that ``probe`` reads
+    #: for each state its column among those that ``probe`` reads, for each number of a sensor that behind these
     states: Mapping[str, int]
-    #: for each reference to several states that stands in a window or a count their columns
+    #: for each reference to several states, or to a sensor of several numbers, that stands in a window or a count their
+    #: columns
     state_groups: Mapping[str, IntArray]
     #: for each reference whose rate is asked for the neurons that it names whose activity is a spike, the others, and
     #: the states that are the spikes of these
     spikes: Mapping[str, tuple[IntArray, IntArray, tuple[str, ...]]]
     probe: Probe
+    #: the numbers of sensors that it reads
+    sensors: tuple[str, ...]
     #: seconds a step
     dt: float
     #: where the text stands, in findings
@@ -146,6 +150,7 @@ def resolved(formula: Formula, network: Network, label: str) -> Measure:
     slots: dict[str, int] = {}
     states: dict[str, StateOf] = {}
     spikes: dict[str, tuple[IntArray, IntArray, tuple[str, ...]]] = {}
+    sensors: dict[str, None] = {}
     several_states: dict[str, tuple[str, ...]] = {}
     places = {PLACE(number) for number in range(len(formula.windows))}
     places |= {COUNTED(number) for number in range(len(formula.counts))}
@@ -162,7 +167,13 @@ def resolved(formula: Formula, network: Network, label: str) -> Measure:
                 several_states[node.name], sizes[node] = single, len(single)
                 continue
             span = _span(label, node.start, node.end)
-            if node.name.startswith(SPIKES):
+            if sensed := _sensed(node.name, network, directory):
+                sensors |= dict.fromkeys(sensed)
+                if len(sensed) > 1 and tree is formula.tree:
+                    _report_several(node.name, f"{len(sensed)} numbers of a sensor", sensed[0], span, findings)
+                elif len(sensed) > 1:
+                    several_states[node.name], sizes[node] = sensed, len(sensed)
+            elif node.name.startswith(SPIKES):
                 _resolve_spikes(node.name, span, network, directory, spikes, states, findings)
             elif node not in several and not _resolve_state(node.name, span, network, directory, states, findings):
                 _resolve(node.name, span, network, directory, neurons, slots, findings)
@@ -172,12 +183,34 @@ def resolved(formula: Formula, network: Network, label: str) -> Measure:
             message, hint = "'count' is of the neurons of a group", "write 'count(E > 0.5)', with a group"
             findings.error("not-one-number", _span(label, one.start, one.end), message, hint)
     findings.check()
-    columns = {name: column for column, name in enumerate(states)}
+    columns = {name: column for column, name in enumerate((*states, *sensors))}
     probe = probe_of(network, states.values())
     of_several = {
         name: np.array([columns[one] for one in single], dtype=np.int64) for name, single in several_states.items()
     }
-    return Measure(formula, neurons, groups, slots, columns, of_several, spikes, probe, network.dt, label)
+    return Measure(
+        formula, neurons, groups, slots, columns, of_several, spikes, probe, tuple(sensors), network.dt, label
+    )
+
+
+def _sensed(name: str, network: Network, directory: Names) -> tuple[str, ...]:
+    """What the numbers of a sensor of the body are called, or the one of them that is named so; none where the name
+    means anything else, or nothing."""
+    sensors = {} if network.body is None else network.body.sensors
+    numbers = sensors.get(name) or tuple(one for own in sensors.values() for one in own if one == name)
+    if not numbers or name in _OF_TIME or name in network.parameters or not isinstance(directory.find(name), str):
+        return ()
+    return () if any(output.name == name for output in network.outputs) else numbers
+
+
+def sensed_columns(measure: Measure, names: Sequence[str] | None) -> IntArray:
+    """Where the numbers of sensors that a measure reads stand among all that are sensed, which have these names; None
+    where nothing is. Raises BodyError for one that is not there."""
+    missing = next((name for name in measure.sensors if name not in (names or ())), None)
+    if missing is not None:
+        why = "there is no body" if names is None else suggest(missing, names, "its sensors are")
+        raise BodyError(f"'{missing}' of '{measure.text}' is not sensed: {why or 'the body has no sensors'}")
+    return np.array([(names or ()).index(name) for name in measure.sensors], dtype=np.int64)
 
 
 def _states_of(name: str, network: Network, directory: Names) -> list[StateOf]:
@@ -244,9 +277,14 @@ def _resolve_state(
         states[name] = first
     else:
         (one,) = network.state_names([StateOf(first.state, first.neurons[:1], first.connections[:1])])
-        message = f"'{shorten(name)}' is {sum(state.size for state in named)} states, and no single one"
-        findings.error("not-one-number", span, message, f"name one of them, as in '{one}'")
+        _report_several(name, f"{sum(state.size for state in named)} states", one, span, findings)
     return True
+
+
+def _report_several(name: str, what: str, one: str, span: Span, findings: Findings) -> None:
+    """Report a name that is ``what``, where a single number is wanted."""
+    message = f"'{shorten(name)}' is {what}, and no single one"
+    findings.error("not-one-number", span, message, f"name one of them, as in '{one}'")
 
 
 def _resolve_spikes(
@@ -291,7 +329,8 @@ def _resolve(
     is_value, found = name in _OF_TIME or name in network.parameters, directory.find(name)
     if isinstance(found, str):
         if not is_value:
-            known = (*network.neuron_index, *directory.views, *network.parameters, *_OF_TIME)
+            sensors = () if network.body is None else tuple(network.body.sensors)
+            known = (*network.neuron_index, *directory.views, *network.parameters, *sensors, *_OF_TIME)
             hint = suggest(name, known, "neurons, outputs and parameters")
             message = f"there is no neuron, output or parameter '{shorten(name)}'"
             findings.error("unknown-name", span, message, hint)
@@ -342,8 +381,8 @@ class Meter:
         return other
 
     def step(self, activity: FloatArray, conditions: Conditions, states: FloatArray) -> float:
-        """After one more step: a[t] of all neurons, the conditions of the step, the states of the probe.
-        NaN before the measure has a value."""
+        """After one more step: a[t] of all neurons, the conditions of the step, the states of the probe and behind them
+        what its sensors measured. NaN before the measure has a value."""
         known = dict(self._constants)
         for name, index in self.measure.neurons.items():
             known[name] = float(activity[index])
@@ -440,8 +479,8 @@ def _broadcast(tree: Tree, known: Mapping[str, float | FloatArray], count: int) 
 
 def over(text: str, network: Network, recording: Recording) -> FloatArray:
     """What a measure is after each step of a recording, (rows,); NaN while it has no value. Parameters are those that
-    the network and its events give. Raises SpecError, and RecordingError for a recording of another network or of some
-    steps only."""
+    the network and its events give. Raises SpecError, BodyError where a sensor was not recorded, and RecordingError for
+    a recording of another network or of some steps only."""
     first = int(recording.step[0]) if len(recording) else 0
     meter = Meter(measure_of(text, network, LABEL), first)
     if recording.neurons != network.neurons.names:
@@ -450,6 +489,10 @@ def over(text: str, network: Network, recording: Recording) -> FloatArray:
     if not np.array_equal(recording.step, np.arange(first, stop)):
         raise RecordingError("a measure is of every step, and the recording holds some of them only")
     states = _states(meter.measure.probe.names, recording)
+    if meter.measure.sensors:
+        sensors = recording.sensors
+        columns = sensed_columns(meter.measure, None if sensors is None else recording.sensor_names)
+        states = np.concatenate((states, np.zeros((len(recording), 0)) if sensors is None else sensors[:, columns]), 1)
     state, controls = initial_state(network), Controls(network)
     edges = sorted({first, stop, *(change.at for change in network.changes if first < change.at < stop)})
     changes = deque(sorted(network.changes, key=lambda change: change.at))

@@ -204,7 +204,7 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     assert (body is None) == (network.body is None)
     if body is not None:
         body.take(state)
-    watched = None if course.until is None else course.until.watch(rows, state, steps)
+    watched = None if course.until is None else course.until.watch(rows, state, steps, body)
     rows = rows if watched is None else watched
     watch = Watch(network)
     columns = columns_of(network, course.keep, body)

@@ -13,7 +13,8 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.runtime.measures import Measure, Meter, findings_of, measure_of
+from neurovis_spec.runtime.embodied import Embodied
+from neurovis_spec.runtime.measures import Measure, Meter, findings_of, measure_of, sensed_columns
 from neurovis_spec.runtime.rows import Rows, RowSink
 from neurovis_spec.runtime.spikes import SpikeLog
 from neurovis_spec.runtime.state import State
@@ -49,19 +50,20 @@ class Until:
             findings.check()
         self.ending: Ending | None = None
 
-    def watch(self, rows: RowSink, state: State, steps: int) -> Watched:
+    def watch(self, rows: RowSink, state: State, steps: int, body: Embodied | None) -> Watched:
         """Rows that ask after each step whether the run is to end. Raises SpecError where there are fewer steps than a
-        window has."""
+        window has, BodyError where the ``body`` has not a sensor of the measure."""
         self.measure.check_steps(steps)
         self.ending = None
-        return Watched(self, rows, state)
+        return Watched(self, rows, state, body)
 
 
 class Watched:
     """Rows as they are handed on, and the meter: it is asked after each step (``due``), or behind many (``made``)."""
 
-    def __init__(self, until: Until, rows: RowSink, state: State) -> None:
-        self._until, self._rows, self._state = until, rows, state
+    def __init__(self, until: Until, rows: RowSink, state: State, body: Embodied | None) -> None:
+        self._until, self._rows, self._state, self._body = until, rows, state, body
+        self._sensed = sensed_columns(until.measure, None if body is None else body.sensor_names)
         self._meter = Meter(until.measure, state.k)
         self._met = False
 
@@ -100,7 +102,10 @@ class Watched:
     def due(self) -> bool:
         """Whether rows are to be handed on now, asked after each step."""
         state, probe = self._state, self._until.measure.probe
-        value = self._meter.step(state.activity, state.conditions, probe.now(state))
+        states = probe.now(state)
+        if self._body is not None:
+            states = np.concatenate((states, self._body.sensed[self._sensed]))
+        value = self._meter.step(state.activity, state.conditions, states)
         self._met = value == value and value != 0
         return self._rows.due() or self._met
 

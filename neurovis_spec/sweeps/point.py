@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from neurovis_spec import api
 from neurovis_spec.body import BodyError
 from neurovis_spec.compiled import CompiledNetwork
@@ -22,7 +24,7 @@ from neurovis_spec.runtime.backend import BackendError
 from neurovis_spec.runtime.columns import Columns, Keep, columns_of
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import InputError
-from neurovis_spec.runtime.measures import Measure, Meter, parsed, resolved
+from neurovis_spec.runtime.measures import Measure, Meter, parsed, resolved, sensed_columns
 from neurovis_spec.runtime.record import run_steps
 from neurovis_spec.runtime.rows import Rows
 from neurovis_spec.runtime.state import State, initial_state
@@ -132,6 +134,7 @@ class _Metered:
         self._state, self._meters = state, meters
         names = columns.probe.names
         self._places = [[names.index(name) for name in meter.measure.probe.names] for meter in meters]
+        self._sensed = [sensed_columns(meter.measure, columns.sensors) for meter in meters]
         self.last = [float("nan")] * len(meters)
 
     def begin(self, count: int) -> Rows:
@@ -140,10 +143,10 @@ class _Metered:
     def end(self, count: int) -> None:
         if count:
             conditions = self._state.conditions
-            activity, states = self._rows.activity[:count], self._rows.states[:count]
+            activity, _, states, sensors, _ = self._rows.part(slice(count))
             self.last = [
-                float(meter.rows(activity, conditions, states[:, places])[-1])
-                for meter, places in zip(self._meters, self._places, strict=True)
+                float(meter.rows(activity, conditions, np.concatenate((states[:, own], sensors[:, sensed]), 1))[-1])
+                for meter, own, sensed in zip(self._meters, self._places, self._sensed, strict=True)
             ]
 
     def due(self) -> bool:

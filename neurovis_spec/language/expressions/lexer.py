@@ -90,7 +90,8 @@ _LOOKALIKES: Mapping[str, str] = {
 
 #: What names an expression may hold beside plain ones; "" are none.
 #:
-#: - ``references``: with points, and the state of a rule, ``(K -> O).e``; ``=`` stands behind the name of an argument;
+#: - ``references``: with points, or with a number behind them, and the state of a rule, ``(K -> O).e``; ``=`` stands
+#:   behind the name of an argument;
 #: - ``subscripts``: with a number behind them, as in ``legs[3]``;
 #: - ``ends``: of what a connection reads of its ends, as in ``pre.v``.
 Naming: TypeAlias = Literal["", "references", "subscripts", "ends"]
@@ -153,10 +154,13 @@ def _special(text: str, at: int, naming: Naming, found: Sequence[Token]) -> Toke
 
 
 def _referring(text: str, at: int, found: Sequence[Token]) -> Token | None:
-    """What measures have besides: a reference with points, the state of a rule, the sign in ``last=N``."""
+    """What measures have besides: a reference with points, the state of a rule, one number of a sensor (``arm[0]``),
+    the sign in ``last=N``."""
     name = _REFERENCE.match(text, at) or _OF_RULE.match(text, at)
     if name and "." in name.group():
         return Token("name", name.group(), at, name.end())
+    if (one := _SUBSCRIPT.match(text, at)) and one[2] is not None:
+        return _subscripted(text, at)
     if _KEYWORD.match(text, at) and len(found) > 2 and found[-1].kind == "name" and found[-2].text in ("(", ","):
         return Token("operator", "=", at, at + 1)
     return None
