@@ -11,9 +11,10 @@ from scenes import scene_of
 
 import neurovis_spec as nv
 from neurovis_spec.layout.geometry import meet, sampled
-from neurovis_spec.layout.model import RADIUS
-from neurovis_spec.scene import Spline, Text
+from neurovis_spec.layout.model import RADIUS, Point
+from neurovis_spec.scene import Disc, Spline, Text
 from neurovis_spec.scene.boxes import Box, Sector, boxes_of, sector
+from neurovis_spec.text_width import width
 
 RING = """
 neurovis: 1
@@ -125,3 +126,46 @@ def test_sectors_are_drawn_as_lines_around_their_neurons() -> None:
         (x, y), size = title.point, title.size
         where = np.array(sampled(shape.points, 1.0)) - (x, y)
         assert np.hypot(*where.T).min() < 8 * size
+
+
+def test_boxes_on_a_ring_are_sectors_where_rectangles_would_have_room_too() -> None:
+    """Of a quarter each, beside neurons in no box: rectangles around these arcs would meet nothing."""
+    text = "neurovis: 1\nname: x\nneurons: {A: {count: 4, box: a}, B: {count: 4, box: b}, D: {count: 12}}\n"
+    boxes = drawn(text + "connections: {A -> B: {weight: 1, pattern: one_to_one}}\nlayout: {engine: circular}\n")
+    assert [box.sector is None for box in boxes] == [False, False]
+
+
+@pytest.mark.parametrize("names", ["N", "a_name_that_no_disc_holds"])
+def test_names_and_titles_of_a_ring_stand_outside_of_it(names: str) -> None:
+    count = 70 if names == "N" else 12
+    group = f"{{count: {count}, box: all}}"
+    if names != "N":
+        listed = ", ".join(f"{names}_{chr(97 + i)}" for i in range(count))
+        group = f"{{names: [{listed}], box: all}}"
+    within, across = "{random: {probability: 0.05}}", "all_to_all"
+    wired = f"connections: {{N -> N: {{weight: 1, pattern: {within}}}, N -> M: {{weight: 1, pattern: {across}}}}}"
+    text = f"neurovis: 1\nname: x\nneurons: {{N: {group}, M: {{count: 5}}}}\n{wired}\nlayout: {{engine: circular}}\n"
+    network = nv.compile_text(text)
+    scene = scene_of(network, network.run(1).snapshot(0))
+    groups = {group.data.get("neuron") or group.id: group.shapes for group in scene.groups}
+    neurons = network.network.neurons.names
+    discs = {name: shape for name in neurons for shape in groups[name] if isinstance(shape, Disc)}
+    at = np.array([disc.centre for disc in discs.values()])
+    middle = (at.min(axis=0) + at.max(axis=0)) / 2
+    told = 0
+    for name, disc in discs.items():
+        for text_ in (shape for shape in groups[name] if isinstance(shape, Text) and not shape.on_disc):
+            told += 1
+            away = np.hypot(*(np.array(_middle(text_)) - middle))
+            assert away > np.hypot(*(np.array(disc.centre) - middle))
+    assert told >= count
+    (title,) = groups["title:all"]
+    assert isinstance(title, Text)
+    assert np.hypot(*(np.array(_middle(title)) - middle)) > np.hypot(*(at - middle).T).min()
+
+
+def _middle(text: Text) -> Point:
+    """The middle of what a text covers."""
+    wide = width(text.text, text.size, text.weight, text.subscript)
+    along = {"start": 0.5, "middle": 0.0, "end": -0.5}[text.anchor]
+    return text.point[0] + along * wide, text.point[1] - 0.3 * text.size

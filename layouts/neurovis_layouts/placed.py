@@ -105,8 +105,9 @@ def _placed(problem: LayoutProblem, engine: str, how: Arrangement, spacing: floa
     blocks = Blocks(problem, formation)
     free = blocks.whole() if problem.modules else blocks.formed(range(len(problem.neurons)))
     pins = with_origins(problem, dict(enumerate(free.places)))
-    layout = routed(free, problem.edges).layout(problem, engine)
-    return sided(problem, kept(problem, layout, pins))
+    layout = kept(problem, routed(free, problem.edges).layout(problem, engine), pins)
+    around = how == "ring" and not problem.pins and problem.memory is None  # the names of a ring stand outside of it
+    return layout if around else sided(problem, layout)
 
 
 class Blocks:

@@ -1,8 +1,8 @@
 """Named boxes: the frame around their neurons.
 
 In: the groups' ``box``, the layout section's ``boxes`` and the instances of modules. Out: rectangles in layout units,
-largest first; where all of a box follow each other on a ring, and a rectangle would hold others, a sector: a stretch of
-that ring. ``titles`` finds room for their titles.
+largest first; where all of a box follow each other on a ring, a sector: a stretch of that ring. ``titles`` finds room
+for their titles.
 """
 
 from __future__ import annotations
@@ -90,17 +90,25 @@ class Sector:
         return np.array(sampled(self.outline(), step))
 
 
-def sector(positions: FloatArray, ring: IntArray, members: IntArray) -> Sector | None:
-    """The sector of the ``members``, of all that are on a ring, None where these form no ring, or others stand between
-    the members, or there are no others."""
-    count = len(ring)
-    if count < _FEWEST_ON_RING or not 0 < len(members) < count or not np.isin(members, ring).all():
+def ring_of(positions: FloatArray, ring: IntArray) -> tuple[Point, float] | None:
+    """The centre and the radius of the ring on which these neurons stand, None where they stand on none."""
+    if len(ring) < _FEWEST_ON_RING:
         return None
     middle = positions[ring].mean(axis=0)
     x, y = (positions[ring] - middle).T
-    radius = float(np.sqrt(x * x + y * y).mean())
-    if np.abs(np.sqrt(x * x + y * y) - radius).max() > _ON_RING:
+    far = np.sqrt(x * x + y * y)
+    radius = float(far.mean())
+    return None if np.abs(far - radius).max() > _ON_RING else ((float(middle[0]), float(middle[1])), radius)
+
+
+def sector(positions: FloatArray, ring: IntArray, members: IntArray) -> Sector | None:
+    """The sector of the ``members``, of all that are on a ring, None where these form no ring, or others stand between
+    the members, or there are no others."""
+    count, found = len(ring), ring_of(positions, ring)
+    if found is None or not 0 < len(members) < count or not np.isin(members, ring).all():
         return None
+    middle, radius = found
+    x, y = (positions[ring] - middle).T
     angle = np.array([math.atan2(b, a) for a, b in zip(x.tolist(), y.tolist(), strict=True)])
     order = np.argsort(angle, kind="stable")
     angle, own = angle[order], np.isin(ring[order], members)
@@ -111,7 +119,27 @@ def sector(positions: FloatArray, ring: IntArray, members: IntArray) -> Sector |
     line = np.unwrap(angle[place])
     last = len(members)
     room = min(HALF / radius, _SHARE * float(line[1] - line[0]), _SHARE * float(line[last + 1] - line[last]))
-    return Sector((float(middle[0]), float(middle[1])), radius, float(line[1]) - room, float(line[last]) + room)
+    return Sector(middle, radius, float(line[1]) - room, float(line[last]) + room)
+
+
+def outward(network: Network, positions: FloatArray) -> dict[int, Point]:
+    """Which way (across, down) is out of the ring on which a neuron stands with all others of its instance, or with all
+    that are in none."""
+    found: dict[int, Point] = {}
+    for ring in _scopes(network, len(positions)):
+        on = ring_of(positions, ring)
+        if on is not None:
+            ways = (positions[ring] - on[0]) / on[1]
+            found.update(zip(ring.tolist(), ((x, y) for x, y in ways.tolist()), strict=True))
+    return found
+
+
+def _scopes(network: Network, count: int) -> list[IntArray]:
+    """The neurons that are in the same innermost instance, or in none."""
+    around = np.full(count, -1, dtype=np.int64)
+    for number, instance in sorted(enumerate(network.instances), key=lambda each: each[1].path.count(".")):
+        around[list(instance.indices)] = number
+    return [np.flatnonzero(around == number) for number in np.unique(around).tolist()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,8 +169,8 @@ def boxes_of(
 ) -> list[Box]:
     """All boxes, and the instances of modules, largest first. Boxes that would touch another's are drawn tighter, what
     holds another is drawn around it. What foreign neurons stand in has no frame: it would say that they belong to it;
-    nor has a box that would lie on the frame of others, where nobody could see what belongs to which. Of boxes on a
-    ring all are sectors where one of them would have no frame. ``labels`` (what those cover for which there is room
+    nor has a box that would lie on the frame of others, where nobody could see what belongs to which. Boxes of neurons
+    that follow each other on a ring are sectors. ``labels`` (what those cover for which there is room
     beside their discs) and titles are within their frames. Layout units."""
     named = _named(network)
     within = {n: frozenset(n.members) for n in named}
@@ -155,8 +183,6 @@ def boxes_of(
         or not any(meet(padded(rects[n], -SLACK), rects[o]) and within[n].isdisjoint(within[o]) for o in clean)
     ]
     sectors = _sectors(network, positions, named)
-    if sectors.keys() <= set(framed):
-        sectors = {}
     drawn: list[tuple[_Named, Rect, Sector | None]] = [(n, rects[n], None) for n in framed if n not in sectors]
     drawn += [(n, one.rect(), one) for n, one in sectors.items()]
     boxes = [
@@ -264,14 +290,11 @@ def _named(network: Network) -> list[_Named]:
 def _sectors(network: Network, positions: FloatArray, named: Sequence[_Named]) -> dict[_Named, Sector]:
     """The sectors of those boxes whose neurons follow each other on a ring, on which all stand that are in the same
     instance, or in none."""
-    around = np.full(len(positions), -1, dtype=np.int64)
-    for number, instance in sorted(enumerate(network.instances), key=lambda each: each[1].path.count(".")):
-        around[list(instance.indices)] = number
+    scope = {member: ring for ring in _scopes(network, len(positions)) for member in ring.tolist()}
     found: dict[_Named, Sector] = {}
     for item in named:
         if item.kind == "box":
-            ring = np.flatnonzero(around == around[item.members[0]])
-            one = sector(positions, ring, np.array(item.members, dtype=np.int64))
+            one = sector(positions, scope[item.members[0]], np.array(item.members, dtype=np.int64))
             if one is not None:
                 found[item] = one
     return found

@@ -9,7 +9,7 @@ smaller one shows.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -99,6 +99,8 @@ class Ground:
     taken: FloatArray
     #: who is in each frame, the largest first
     frames: Sequence[Collection[int]] = ()
+    #: which way (across, down) is out of the ring on which a neuron stands
+    outward: Mapping[int, Point] = field(default_factory=dict)
 
     def centre(self, index: int) -> Point:
         """The centre of a disc in the picture."""
@@ -230,6 +232,7 @@ def _beside(
                 max(until[one] for one in members),
                 tuple(kept) if len(kept) == len(members) else (),
                 lines.get(index, -1),
+                ground.outward.get(index),
             )
         )
     level, taken = _level(network), (ground.taken - np.tile(ground.shift, 2)) / ground.scale

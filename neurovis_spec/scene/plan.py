@@ -22,7 +22,7 @@ from neurovis_spec.layout.model import RADIUS, Layout, Point, Side
 from neurovis_spec.layout.naming import natural_key
 from neurovis_spec.projection import called, nearness
 from neurovis_spec.scene import delays, encoding, legend, texts
-from neurovis_spec.scene.boxes import Box, boxes_of, entitled
+from neurovis_spec.scene.boxes import Box, boxes_of, entitled, outward
 from neurovis_spec.scene.caption import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
 from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.ends import EndArray, SetEnds, signed
@@ -289,7 +289,10 @@ def _texts(content: _Content, page: _OnPage, settings: RenderSettings, sizes: Ma
     connections, the other titles. ``sizes`` are those of glyphs."""
     network, obstacles, boxes, theme = content.network, page.obstacles, page.boxes, theme_of(settings)
     titled = _titled(boxes, page.frame, page.picture)
-    titles = in_one_place(titled, obstacles, theme, [_mapped(rect, page.frame) for rect in content.rooms.values()])
+    framed = [index for index, box in enumerate(boxes) if box.sector is None]  # there is no one place along a ring
+    kept = [_mapped(rect, page.frame) for rect in content.rooms.values()]
+    found = in_one_place([titled[index] for index in framed], obstacles, theme, kept)
+    titles = {framed[place]: text for place, text in found.items()}
     labels: list[Label | None] = [None] * len(network.neurons)
     lines: Mapping[str, Text] = {}
     if settings.labels:
@@ -326,6 +329,7 @@ def _ground(content: _Content, page: _OnPage) -> Ground:
         margin_beside(network, RADIUS * frame.scale, rooms) if page.margin > MARGIN else 0.0,
         page.obstacles.texts(),
         [box.members for box in boxes],
+        outward(network, content.positions),
     )
 
 
@@ -634,9 +638,10 @@ def _room(box: Box, boxes: Sequence[Box], frame: Frame, picture: Rect) -> Rect:
 
 
 def _foreign(box: Box, boxes: Sequence[Box], frame: Frame) -> tuple[Rect, ...]:
-    """The frames that do not hold a box."""
+    """The frames that do not hold a box, but for sectors, which do not fill their rectangles."""
     within = set(box.members)
-    return tuple(_mapped(other.rect, frame) for other in boxes if not within <= set(other.members))
+    others = (other for other in boxes if other.sector is None and not within <= set(other.members))
+    return tuple(_mapped(other.rect, frame) for other in others)
 
 
 def _mapped(rect: Rect, frame: Frame) -> Rect:

@@ -7,6 +7,7 @@ business of ``beside``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -16,12 +17,15 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.layout.labels import beside
+from neurovis_spec.layout.model import Point
 
 #: Between a label and the middle of a line that does not touch it, in page units.
 _LINE = 2.5
 #: How far labels may reach beyond the discs at the rim, in page units; where more is asked for, so much and a share of
 #: the width.
 BEYOND, _ALWAYS, _SHARE = 20.0, 50.0, 0.3
+#: The cosine of one and a half eighths of a turn.
+_TOWARDS = 0.3827
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +49,11 @@ class Slot:
         if self.down:
             y0, y1 = (inner, y1) if self.down > 0 else (y0, -inner)
         return x0, y0, x1, y1
+
+    def leads(self, way: Point) -> bool:
+        """Whether it is, of the eight sides, one of the three that are most in this direction."""
+        far = math.hypot(self.across, self.down) * math.hypot(*way)
+        return self.across * way[0] + self.down * way[1] > _TOWARDS * far
 
     def mirrored(self, level: bool) -> Slot:
         """The side on the mirror image of the disc: top and bottom change places where signals run across."""
@@ -70,6 +79,8 @@ class Wanted:
     kept: tuple[Slot, ...] = ()
     #: those with the same number stand on one side as far as they can; −1 for none
     line: int = -1
+    #: which way (across, down) is out of the ring on which it stands: names are not within
+    outward: Point | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +185,8 @@ class Spots:
             return []  # where there is no room for less there is none for more
         sides = [(slot, slot.mirrored(self._field.level))[: len(one.members)] for slot in self._field.sides]
         options = [one.kept, *(each for each in sides if each != one.kept)] if one.kept else sides
+        if one.outward is not None:
+            options = [each for each in options if each[0].leads(one.outward)]
         rects: list[tuple[FloatArray, FloatArray]] = []
         free = np.ones(len(options), np.bool_)
         for place, own in enumerate(zip(one.members, one.wordings[wording], strict=True)):
