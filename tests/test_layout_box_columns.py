@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples
-from neurovis_layouts.layered.box_columns import Strips, straightened, tied, with_spines
+from neurovis_layouts.layered.box_columns import Strips, straightened, tied, spined
 from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.order import ordered
 from neurovis_layouts.layered.units import Unit
@@ -115,7 +115,7 @@ def cases(draw: st.DrawFn) -> tuple[LayoutProblem, list[int], list[Unit]]:
 def built(problem: LayoutProblem, rank: list[int], units: list[Unit]) -> tuple[Levels, list[list[int]], set[int]]:
     columns = set(range(len(problem.boxes)))
     levels = levels_of(problem, units, rank, range(len(problem.edges)), columns)
-    with_spines(problem, levels, columns)
+    spined(problem, levels, columns)
     order = straightened(levels, ordered(levels)[1], columns)
     return (levels, order or [], columns)
 

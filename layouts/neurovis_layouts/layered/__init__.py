@@ -34,13 +34,13 @@ class LayeredEngine:
         lines that a formation cannot keep."""
         from neurovis_layouts.incremental import kept  # only here: who asks what it can do needs none of it
         from neurovis_layouts.label_sides import sided
-        from neurovis_layouts.layered.engine import drawn
+        from neurovis_layouts.layered.hierarchy import drawn
 
         fresh = drawn(problem, self.name)
         return sided(problem, kept(problem, fresh) if problem.memory else fresh)
 
     def check(self, problem: LayoutProblem) -> None:
         """Raises the LayoutRefusalError that ``lay_out`` would."""
-        from neurovis_layouts.layered.engine import checked
+        from neurovis_layouts.layered.hierarchy import checked
 
         checked(problem)

@@ -5,7 +5,7 @@ within boxes marked as theirs; an order in which whatever hangs together outside
 across that leave each box its strip. So a box may stand beside what it drives and is driven by, which a block cannot.
 After Sander (1996), Layout of compound directed graphs.
 
-The stages, in the order in which they are called: ``with_spines`` gives a box a node in each of its ranks, joined to a
+The stages, in the order in which they are called: ``spined`` gives a box a node in each of its ranks, joined to a
 line, which holds the box together while ranks are ordered; ``straightened`` moves what hangs together outside to one
 side of that; ``tied`` takes away the spines where the box has nodes of its own, which are tied to each other instead;
 ``Strips`` keeps, when nodes find their places across, the left and the right line of each strip as two more nodes.
@@ -35,7 +35,7 @@ _SPINE, _TIED = 8.0, 3.0
 _ROUNDS = 24
 
 
-def with_spines(problem: LayoutProblem, levels: Levels, columns: AbstractSet[int]) -> None:
+def spined(problem: LayoutProblem, levels: Levels, columns: AbstractSet[int]) -> None:
     """Give every column a node in each of its ranks, joined to a line, and the passages of its own connections."""
     box_of = {m: b for b in sorted(columns) for m in problem.boxes[b][1]}
     for i, passages in levels.passages.items():
@@ -86,38 +86,45 @@ def _part(levels: Levels, order: list[list[int]], box: int, sides: dict[tuple[in
     where these contradict each other.
     """
     spans = [r for r, rank in enumerate(order) if any(levels.nodes[n].box == box for n in rank)]
-    foreign = [n for r in spans for n in order[r] if levels.nodes[n].box != box]
-    hanging: nx.Graph[int] = nx.Graph()
-    hanging.add_nodes_from(foreign)
-    for r in spans[:-1]:
-        ends = ((segment.upper, segment.lower) for segment in levels.segments[r])
-        hanging.add_edges_from(pair for pair in ends if pair[0] in hanging and pair[1] in hanging)
-    first: dict[int, int] = {}
-    for n in foreign:
-        other = levels.nodes[n].box
-        if other >= 0:
-            hanging.add_edge(first.setdefault(other, n), n)
-    part = {n: number for number, mates in enumerate(nx.connected_components(hanging)) for n in mates}
-    lean: dict[int, int] = dict.fromkeys(part.values(), 0)
+    part, first = _connected(levels, order, spans, box)
+    lean = dict.fromkeys(part.values(), 0)
     for r in spans:
         start = next(i for i, n in enumerate(order[r]) if levels.nodes[n].box == box)
         for i, n in enumerate(order[r]):
             if n in part:
                 lean[part[n]] += 1 if i > start else -1
-    for other, n in sorted(first.items()):
+    of = {other: part[n] for other, n in first.items()}
+    for other in sorted(of):
         settled = sides.get((box, other), 0)
-        if settled and lean[part[n]] * settled <= 0:
-            if any(sides.get((box, b), settled) != settled for b, m in first.items() if part[m] == part[n]):
+        if settled and lean[of[other]] * settled <= 0:
+            if any(sides.get((box, mate), settled) != settled for mate in of if of[mate] == of[other]):
                 return False
-            lean[part[n]] = settled
-    for other, n in first.items():
-        side = -1 if lean[part[n]] < 0 else 1
-        sides[box, other], sides[other, box] = side, -side
+            lean[of[other]] = settled
+    side = {number: -1 if lean[number] < 0 else 1 for number in lean}
+    for other, number in of.items():
+        sides[box, other], sides[other, box] = side[number], -side[number]
     for r in spans:
-        left = [n for n in order[r] if n in part and lean[part[n]] < 0]
-        right = [n for n in order[r] if n in part and lean[part[n]] >= 0]
-        order[r] = left + [n for n in order[r] if n not in part] + right
+        order[r].sort(key=lambda n: side[part[n]] if n in part else 0)
     return True
+
+
+def _connected(
+    levels: Levels, order: Sequence[Sequence[int]], spans: Sequence[int], box: int
+) -> tuple[dict[int, int], dict[int, int]]:
+    """Of what stands in the ranks of a column and is not in it: the connected part that each node is of, another column
+    being one; and the first node of each other column."""
+    foreign = [n for r in spans for n in order[r] if levels.nodes[n].box != box]
+    hanging: nx.Graph[int] = nx.Graph()
+    hanging.add_nodes_from(foreign)
+    for segment in (segment for r in spans[:-1] for segment in levels.segments[r]):
+        if segment.upper in hanging and segment.lower in hanging:
+            hanging.add_edge(segment.upper, segment.lower)
+    first: dict[int, int] = {}
+    for n in foreign:
+        other = levels.nodes[n].box
+        if other >= 0:
+            hanging.add_edge(first.setdefault(other, n), n)
+    return {n: number for number, mates in enumerate(nx.connected_components(hanging)) for n in mates}, first
 
 
 def tied(levels: Levels, order: Sequence[Sequence[int]], columns: AbstractSet[int]) -> tuple[Levels, list[list[int]]]:
@@ -195,13 +202,7 @@ class Strips:
     def kept(self, wishes: Sequence[float], pulls: Mapping[int, Sequence[tuple[int, float, float]]]) -> list[float]:
         """Places of the nodes that keep all distances, near to where they wish to be; ``pulls`` are by node: the other
         node, how far from it, weight."""
-        own: dict[int, list[int]] = {}
-        for b in self._line.values():
-            own[b] = sorted(self._after[b].keys() - {b + 1})
-        wish = list(wishes) + [0.0] * (len(self._after) - self._count)
-        for b in self._line.values():
-            wish[b] = min((wish[n] - self._after[b][n] for n in own[b]), default=0.0)
-            wish[b + 1] = max((wish[n] + gap for n, gap in sorted(self._before[b + 1].items()) if n != b), default=0.0)
+        wish = self._with_lines(wishes)
         # the mean of two solutions is one: pushed to the right, and pushed to the left
         right, left = list(wish), list(wish)
         for n in self._sorted:
@@ -211,17 +212,30 @@ class Strips:
         x = [(a + b) / 2 for a, b in zip(right, left, strict=True)]
         for turn in range(_ROUNDS):
             for n in self._sorted if turn % 2 == 0 else self._sorted[::-1]:
-                low = max((x[a] + gap for a, gap in self._before[n].items()), default=-np.inf)
-                high = min((x[b] - gap for b, gap in self._after[n].items()), default=np.inf)
-                if n >= self._count:
-                    if np.isfinite(low) and np.isfinite(high):
-                        x[n] = (low + high) / 2
-                    continue
-                mass = math.fsum(weight for _, _, weight in pulls.get(n, ()))
-                if mass > 0:
-                    aim = math.fsum(weight * (x[other] + far) for other, far, weight in pulls[n]) / mass
-                    x[n] = min(max(aim, low), max(low, high))
+                x[n] = self._pulled(n, x, pulls.get(n, ()))
         return x[: self._count]
+
+    def _with_lines(self, wishes: Sequence[float]) -> list[float]:
+        """The wishes of nodes, and those of the lines of columns: as near to their nodes as can be."""
+        wish = list(wishes) + [0.0] * (len(self._after) - self._count)
+        for b in self._line.values():
+            own = sorted(self._after[b].keys() - {b + 1})
+            wish[b] = min((wish[n] - self._after[b][n] for n in own), default=0.0)
+            wish[b + 1] = max((wish[n] + gap for n, gap in sorted(self._before[b + 1].items()) if n != b), default=0.0)
+        return wish
+
+    def _pulled(self, n: int, x: Sequence[float], pulls: Sequence[tuple[int, float, float]]) -> float:
+        """Where a node goes that is pulled, and a line, to the middle of what it has, the others being where they
+        are."""
+        low = max((x[a] + gap for a, gap in self._before[n].items()), default=-np.inf)
+        high = min((x[b] - gap for b, gap in self._after[n].items()), default=np.inf)
+        if n >= self._count:
+            return (low + high) / 2 if np.isfinite(low) and np.isfinite(high) else x[n]
+        mass = math.fsum(weight for _, _, weight in pulls)
+        if mass <= 0:
+            return x[n]
+        aim = math.fsum(weight * (x[other] + far) for other, far, weight in pulls) / mass
+        return min(max(aim, low), max(low, high))
 
 
 def _inside(node: Node) -> float:

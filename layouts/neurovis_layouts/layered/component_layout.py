@@ -1,7 +1,7 @@
-"""Component layout: units that hang together, in ranks.
+"""Component layout: units that hang together, in ranks: the phases of which ``engine`` has the list.
 
-In: a RankProblem. Out: a ComponentLayout: the places of neurons, the waypoints of edges, and which frames inside are
-reflected. It calls the stages ranks, levels, order and places one after the other.
+In: a RankProblem, made a Component, to which each phase adds what it makes. Out: a ComponentLayout: the places of
+neurons, the waypoints of edges, and which frames inside are reflected.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import networkx as nx
 from neurovis_layouts.frame import from_picture
 from neurovis_layouts.label_room import at_ends, covered, sides_of
 from neurovis_layouts.layered.bands import Bands, Wanted, banded
-from neurovis_layouts.layered.box_columns import straightened, tied, with_spines
+from neurovis_layouts.layered.box_columns import spined, straightened, tied
 from neurovis_layouts.layered.flips import Reading, reflected
 from neurovis_layouts.layered.folds import Folds, PlacedRanks, folded, interleaved, stacked, with_exits
 from neurovis_layouts.layered.levels import Levels, levels_of
@@ -111,83 +111,222 @@ class ComponentLayout:
 
 
 @dataclass(frozen=True, slots=True)
-class _InOrder:
-    """Levels with the order of each rank, how many segments cross, the mirror image of each node, the boxes that are
-    columns, and what is folded."""
+class Component:
+    """A component as far as the phases have come with it; what a phase makes, the next ones read."""
 
-    levels: Levels
-    order: Order
-    crossed: int
-    partner: Sequence[int] | None
-    columns: AbstractSet[int]
-    folds: Folds
+    part: RankProblem
+    #: by unit
+    rank: Sequence[int]
+    folds: Folds = field(default_factory=lambda: Folds([]))
+    #: the boxes that are columns
+    columns: AbstractSet[int] = frozenset()
+    levels: Levels = field(default_factory=Levels)
+    order: Order = field(default_factory=list)
+    #: the mirror image of each node
+    partner: Sequence[int] | None = None
+    #: how many segments cross
+    crossed: int = 0
+    #: by node; which ranks are staggered
+    places: list[Point] = field(default_factory=list)
+    uneven: AbstractSet[int] = frozenset()
+    layout: ComponentLayout = field(default_factory=ComponentLayout)
 
-    def cost(self, problem: LayoutProblem) -> float:
+    def draft(self) -> Component:
+        """The same, of which only the cost matters."""
+        return replace(self, part=replace(self.part, draft=True))
+
+    def cost(self) -> float:
         """How many segments cross, and about how many will be crossed by connections that lead from outside of a frame
         into it, which come from above, and by those that lead out of it."""
+        problem = self.part.problem
         rank = {m: node.rank for node in self.levels.nodes for m, _, _ in node.members}
         last = len(self.order) - 1
         ways = [rank[m] for m in problem.inward if m in rank] + [last - rank[m] for m in problem.outward if m in rank]
         return self.crossed + _PASSED * sum(ways)
 
 
-def component_layout(part: RankProblem) -> ComponentLayout:
-    """The layout of one component: its units in ranks, these in order and at their places."""
-    best = _best_order(part)
-    flipped, best = _turned(part, best)
-    problem, levels = part.problem, best.levels
-    plan = ComponentLayout(reflected=flipped)
-    plan.sides = at_ends(problem, _singles(levels, 0), _singles(levels, -1))
-    for n, node in enumerate(levels.nodes):
-        if node.members and node.members[0][0] in plan.sides:
-            levels.nodes[n] = replace(node, reach=(node.reach[0], 0.0))
-    ranks = _placed(part, best)
-    for node, (x, y) in zip(ranks.levels.nodes, ranks.places, strict=True):
-        for member, dx, dy in node.members:
-            plan.places[member] = (x + dx, y + dy)
-        if node.framed:
-            plan.rects.append((x - node.reach[0], y - node.reach[1], x + node.reach[0], y + node.reach[1]))
-    plan.ways, whole = with_exits(problem, part.edges, ranks, _passages(ranks))
-    if whole and not best.crossed:
-        plan.firm |= whole
-    if not part.pair:
-        plan.cuts, bands = banded(problem, ranks.levels, ranks.places, best.folds.ranks, part.wanted)
-        if part.wanted.bands > 1:
-            _in_bands(problem, plan, ranks.levels, bands)
-    sides = {**dict(enumerate(sides_of(problem))), **plan.sides}
-    plan.rects += covered(problem, plan.places, sides, sorted(plan.places)).values()
-    return plan
+def ranked(part: RankProblem) -> list[Component]:
+    """The component in ranks, once for each way of cutting loops that makes a difference."""
+    problem, units, bonds = part.problem, part.units, part.bonds
+    numbers = {bond: number for number, bond in enumerate(dict.fromkeys(bonds))}
+    owner = {m: numbers[bond] for unit, bond in zip(units, bonds, strict=True) for m in unit.members}
+    arcs, along = _arcs(part, owner)
+    first, last = ({owner[m] for m in ends if m in owner} for ends in (problem.entries, problem.exits))
+    templates = {module.members: module.template for module in problem.modules}
+    known = [(numbers[bond], templates.get(unit.members)) for unit, bond in zip(units, bonds, strict=True)]
+    kinds = {number: template for number, template in known if template is not None}
+    found: dict[tuple[int, ...], None] = {}
+    for entered in _ENTERED:
+        ranks = levelled(ranks_of(len(numbers), arcs, first, last, along, entered), arcs, kinds)
+        found[tuple(ranks[numbers[bond]] for bond in bonds)] = None
+    return [Component(part, rank) for rank in found]
 
 
-def _best_order(part: RankProblem) -> _InOrder:
-    """Ranks and order, of all ways of cutting loops with the one that costs least."""
-    found = [_one_on_axis(part, rank) if part.pair else rank for rank in _ranks(part)]
-    drafted = replace(part, draft=True)
-    rank = found[0] if len(found) == 1 else min(found, key=lambda rank: _in_order(drafted, rank).cost(part.problem))
-    return _in_order(part, rank)
+def _arcs(part: RankProblem, owner: Mapping[int, int]) -> tuple[dict[tuple[int, int], float], set[tuple[int, int]]]:
+    """What runs from bond to bond, with its weight, and what of it is in no loop of neurons; ``owner`` is the bond of a
+    neuron."""
+    edges = [part.problem.edges[i] for i in part.edges]
+    wired: nx.DiGraph[int] = nx.DiGraph(way for edge in edges for way in edge.ways)
+    loop_of = {neuron: k for k, loop in enumerate(nx.strongly_connected_components(wired)) for neuron in loop}
+    along = {(owner[e.source], owner[e.target]) for e in edges if loop_of[e.source] != loop_of[e.target]}
+    arcs: dict[tuple[int, int], float] = {}
+    for edge in edges:
+        ends = owner[edge.source], owner[edge.target]
+        if ends[0] != ends[1]:
+            arcs[ends] = arcs.get(ends, 0.0) + (INSTANT if edge.delay == 0 else 1.0)
+    behind = [(owner[a], owner[b]) for a, b in part.behind if a in owner and b in owner]
+    arcs.update({(a, b): _ROW for a, b in behind if a != b})
+    return arcs, along
 
 
-def _turned(part: RankProblem, found: _InOrder) -> tuple[set[int], _InOrder]:
-    """The same with those frames as their mirror images, and as a whole so, as it crosses least and is read best; and
-    the first neurons of these frames."""
+def with_axis(found: Component) -> Component:
+    """The ranks of what is symmetric, in which nobody is in the way on the axis."""
+    return replace(found, rank=_one_on_axis(found.part, found.rank))
+
+
+def with_folds(found: Component) -> Component:
+    """Frames that are too many for one rank in several rows."""
+    part = found.part
+    return replace(found, folds=folded(part.problem, part.units, part.bonds, found.rank, part.edges, part.pair))
+
+
+def with_levels(found: Component) -> Component:
+    """Nodes in their ranks, and the passages of what crosses these."""
+    part, rank = found.part, found.folds.rank
+    here = {m for unit in part.units for m in unit.members}
+    columns = {box for box in part.columns if here.issuperset(part.problem.boxes[box][1])}
+    level = [*rank, *([max(rank)] * len(part.guests))]
+    levels = levels_of(part.problem, [*part.units, *part.guests], level, part.edges, columns)
+    return replace(found, columns=columns, levels=levels)
+
+
+def with_rows_interleaved(found: Component) -> Component:
+    """The rows of folds, and what runs through them, from side to side."""
+    interleaved(found.levels, found.part.problem, found.folds)
+    return found
+
+
+def with_spines(found: Component) -> Component:
+    """Boxes that are columns held together while ranks are ordered."""
+    spined(found.part.problem, found.levels, found.columns)
+    return found
+
+
+def in_order(found: Component) -> Component:
+    """Ranks in an order in which few connections cross."""
+    levels, order = ordered(found.levels, _free(found), found.part.problem.effort, found.part.draft)
+    return replace(found, levels=levels, order=order)
+
+
+def in_symmetric_order(found: Component) -> Component:
+    """The same with mirror images opposite each other."""
+    part = found.part
+    levels, order, partner = mirrored(part.problem, found.levels, part.pair, _free(found), part.draft)
+    return replace(found, levels=levels, order=order, partner=partner)
+
+
+def with_straight_columns(found: Component) -> Component:
+    """What hangs together on one side of a column; no columns where that cannot be."""
+    straight = straightened(found.levels, found.order, found.columns)
+    return replace(found, order=straight) if straight else replace(found, columns=frozenset())
+
+
+def with_crossings(found: Component) -> Component:
+    """What the order costs."""
+    return replace(found, crossed=crossings(found.levels, found.order))
+
+
+def with_columns_tied(found: Component) -> Component:
+    """Columns held together by their own nodes."""
+    levels, order = tied(found.levels, found.order, found.columns)
+    return replace(found, levels=levels, order=order)
+
+
+def with_reflections(found: Component) -> Component:
+    """Frames as their mirror images, and the whole so, as it crosses least and is read best."""
+    part = found.part
     may = {min(unit.members) for unit in part.units if unit.turns and not part.draft}
     reading = None if part.pair or part.draft else _reading(part)
     levels, order, flipped = reflected(found.levels, found.order, may, reading)
-    return flipped, replace(found, levels=levels, order=order)
+    return replace(found, levels=levels, order=order, layout=ComponentLayout(reflected=flipped))
 
 
-def _placed(part: RankProblem, found: _InOrder) -> PlacedRanks:
-    """The places of what is in order; of much that is wide in staggered ranks."""
-    problem, levels, order, folds = part.problem, found.levels, found.order, found.folds
+def with_labels_at_ends(found: Component) -> Component:
+    """Labels of the first and the last rank before and behind it, where nothing runs."""
+    levels = found.levels
+    sides = at_ends(found.part.problem, _singles(levels, 0), _singles(levels, -1))
+    nodes = [
+        replace(node, reach=(node.reach[0], 0.0)) if node.members and node.members[0][0] in sides else node
+        for node in levels.nodes
+    ]
+    return replace(found, levels=replace(levels, nodes=nodes), layout=replace(found.layout, sides=sides))
+
+
+def with_places(found: Component) -> Component:
+    """Places across and along."""
+    problem, ranks = found.part.problem, stacked(found.levels, found.folds)
     spacing = problem.neuron_spacing, problem.rank_spacing
-    places = placed(stacked(levels, folds), order, *spacing, found.partner, found.columns, folds.ranks)
-    uneven = frozenset[int]()
-    if found.partner is None and not found.columns and (lifted := staggered(problem, levels, order, places)):
-        levels = lifted
-        uneven = frozenset(r for r, rank in enumerate(order) if any(levels.nodes[n].lift for n in rank))
-        places = placed(stacked(levels, folds), order, *spacing, found.partner, found.columns, folds.ranks)
-    _draw_in(levels, order, places, part.loose, problem.neuron_spacing)
-    return PlacedRanks(levels, places, list(zip(*reaches(levels, order), strict=True)), folds, uneven)
+    return replace(found, places=placed(ranks, found.order, *spacing, found.partner, found.columns, found.folds.ranks))
+
+
+def with_staggered_ranks(found: Component) -> Component:
+    """Much that is wide in ranks of two rows."""
+    levels = staggered(found.part.problem, found.levels, found.order, found.places)
+    if levels is None:
+        return found
+    uneven = frozenset(r for r, rank in enumerate(found.order) if any(levels.nodes[n].lift for n in rank))
+    return with_places(replace(found, levels=levels, uneven=uneven))
+
+
+def with_guests_drawn_in(found: Component) -> Component:
+    """Unconnected neurons at the end of a rank close to their neighbour, two units off, not where the rank left
+    them."""
+    places, nodes, guests = list(found.places), found.levels.nodes, found.part.loose
+    for rank in found.order:
+        for before, node in pairwise(rank):
+            own, other = nodes[node], nodes[before]
+            if own.members and own.members[0][0] in guests and node == rank[-1] and other.members:
+                beside = 2.0 if other.members[0][0] not in guests else 1.0
+                across = places[before][0] + other.reach[0] + own.reach[0]
+                places[node] = (snap(across + beside * found.part.problem.neuron_spacing), places[node][1])
+    return replace(found, places=places)
+
+
+def with_neurons(found: Component) -> Component:
+    """Where neurons and frames stand, by the places of their nodes."""
+    places: dict[int, Point] = {}
+    rects: list[Rect] = []
+    for node, (x, y) in zip(found.levels.nodes, found.places, strict=True):
+        places.update({member: (x + dx, y + dy) for member, dx, dy in node.members})
+        if node.framed:
+            rects.append((x - node.reach[0], y - node.reach[1], x + node.reach[0], y + node.reach[1]))
+    return replace(found, layout=replace(found.layout, places=places, rects=rects))
+
+
+def with_waypoints(found: Component) -> Component:
+    """The waypoints of connections: their passages, and where they leave folds and staggered ranks."""
+    spans = list(zip(*reaches(found.levels, found.order), strict=True))
+    ranks = PlacedRanks(found.levels, found.places, spans, found.folds, found.uneven)
+    ways, whole = with_exits(found.part.problem, found.part.edges, ranks, _passages(ranks))
+    return replace(found, layout=replace(found.layout, ways=ways, firm=set() if found.crossed else whole))
+
+
+def in_bands(found: Component) -> Component:
+    """The ranks cut, and their parts side by side; in how many they might be."""
+    part, levels = found.part, found.levels
+    cuts, bands = banded(part.problem, levels, found.places, found.folds.ranks, part.wanted)
+    layout = replace(found.layout, cuts=cuts)
+    return replace(
+        found, layout=_moved_to_bands(part.problem, layout, levels, bands) if part.wanted.bands > 1 else layout
+    )
+
+
+def with_labels(found: Component) -> Component:
+    """What labels cover."""
+    problem, layout = found.part.problem, found.layout
+    sides = {**dict(enumerate(sides_of(problem))), **layout.sides}
+    labels = covered(problem, layout.places, sides, sorted(layout.places)).values()
+    return replace(found, layout=replace(layout, rects=[*layout.rects, *labels]))
 
 
 def _passages(ranks: PlacedRanks) -> dict[int, list[Waypoint]]:
@@ -199,40 +338,6 @@ def _passages(ranks: PlacedRanks) -> dict[int, list[Waypoint]]:
             (x, y), (before, behind) = ranks.places[n], ranks.spans[ranks.levels.nodes[n].rank]
             found[i].append(Waypoint(x, y + (behind - before) / 2, (before + behind) / 2))
     return found
-
-
-def _ranks(part: RankProblem) -> list[list[int]]:
-    """Ranks of these units, one for each way of cutting loops that makes a difference."""
-    problem, units, bonds = part.problem, part.units, part.bonds
-    numbers = {bond: number for number, bond in enumerate(dict.fromkeys(bonds))}
-    owner = {m: numbers[bond] for unit, bond in zip(units, bonds, strict=True) for m in unit.members}
-    wired: nx.DiGraph[int] = nx.DiGraph(way for i in part.edges for way in problem.edges[i].ways)
-    loop_of = {neuron: k for k, loop in enumerate(nx.strongly_connected_components(wired)) for neuron in loop}
-    arcs: dict[tuple[int, int], float] = {}
-    along: set[tuple[int, int]] = set()
-    for i in part.edges:
-        edge = problem.edges[i]
-        ends = owner[edge.source], owner[edge.target]
-        if loop_of[edge.source] != loop_of[edge.target]:
-            along.add(ends)
-        if ends[0] != ends[1]:
-            arcs[ends] = arcs.get(ends, 0.0) + (INSTANT if edge.delay == 0 else 1.0)
-    arcs.update(
-        {(owner[a], owner[b]): _ROW for a, b in part.behind if a in owner and b in owner and owner[a] != owner[b]}
-    )
-    first = {owner[m] for m in problem.entries if m in owner}
-    last = {owner[m] for m in problem.exits if m in owner}
-    templates = {module.members: module.template for module in problem.modules}
-    kinds = {
-        numbers[bond]: templates[unit.members]
-        for unit, bond in zip(units, bonds, strict=True)
-        if unit.members in templates
-    }
-    found: dict[tuple[int, ...], None] = {}
-    for entered in _ENTERED:
-        ranks = levelled(ranks_of(len(numbers), arcs, first, last, along, entered), arcs, kinds)
-        found[tuple(ranks[numbers[bond]] for bond in bonds)] = None
-    return [list(rank) for rank in found]
 
 
 def _one_on_axis(part: RankProblem, rank: Sequence[int]) -> list[int]:
@@ -260,33 +365,12 @@ def _one_on_axis(part: RankProblem, rank: Sequence[int]) -> list[int]:
     return [levels[value] for value in result]
 
 
-def _in_order(part: RankProblem, rank: Sequence[int]) -> _InOrder:
-    """Units that have their ranks, in order."""
-    problem, guests, pair = part.problem, part.guests, part.pair
-    here = {m for unit in part.units for m in unit.members}
-    columns: AbstractSet[int] = {box for box in part.columns if here.issuperset(problem.boxes[box][1])}
-    folds = folded(problem, part.units, part.bonds, rank, part.edges, pair)
-    level = [*folds.rank, *([max(folds.rank)] * len(guests))]
-    levels = levels_of(problem, [*part.units, *guests], level, part.edges, columns)
-    interleaved(levels, problem, folds)
-    with_spines(problem, levels, columns)
-    partner: Sequence[int] | None = None
-    free = frozenset[int]() if columns or folds.ranks else _free(levels, part)
-    if pair:
-        levels, order, partner = mirrored(problem, levels, pair, free, part.draft)
-    else:
-        levels, order = ordered(levels, free, problem.effort, part.draft)
-    straight = straightened(levels, order, columns) if columns else None
-    columns, order = (columns, straight) if straight else (frozenset(), order)
-    crossed = crossings(levels, order)
-    if columns:
-        levels, order = tied(levels, order, columns)
-    return _InOrder(levels, order, crossed, partner, columns, folds)
-
-
-def _free(levels: Levels, part: RankProblem) -> frozenset[int]:
+def _free(found: Component) -> frozenset[int]:
     """The nodes that may change their rank: single neurons that share none with others but their images, outside of
     boxes."""
+    part, levels = found.part, found.levels
+    if found.columns or found.folds.ranks:
+        return frozenset()
     count = Counter(part.bonds)
     alone = {
         unit.members[0]
@@ -317,36 +401,19 @@ def _singles(levels: Levels, rank: int) -> list[int]:
     return [node.members[0][0] for node in nodes if len(node.members) == 1 and not node.framed]
 
 
-def _in_bands(problem: LayoutProblem, plan: ComponentLayout, levels: Levels, bands: Bands) -> None:
-    """Move what stands in each band there."""
+def _moved_to_bands(problem: LayoutProblem, layout: ComponentLayout, levels: Levels, bands: Bands) -> ComponentLayout:
+    """What stands in each band moved there."""
     shift = [bands.shifts[bands.band[node.rank]] for node in levels.nodes]
     own = {m: shift[n] for n, node in enumerate(levels.nodes) for m, _, _ in node.members}
     framed = [n for n, node in enumerate(levels.nodes) if node.framed]
-    plan.places.update({m: (x + own[m][0], y + own[m][1]) for m, (x, y) in plan.places.items()})
-    plan.rects = [shifted(rect, shift[n]) for n, rect in zip(framed, plan.rects, strict=True)]
     rank = {m: node.rank for node in levels.nodes for m, _, _ in node.members}
-    for i, line in bands.ways.items():
-        plan.cut[i] = line if rank[problem.edges[i].source] < rank[problem.edges[i].target] else line[::-1]
-    plan.firm -= plan.cut.keys()
-    plan.ways = {
-        i: [Waypoint(way.x + dx, way.y + dy, way.half) for way in ways]
-        for i, ways in plan.ways.items()
-        for dx, dy in (own[problem.edges[i].source],)
-        if i not in plan.cut
-    }
-
-
-def _draw_in(
-    levels: Levels, order: Sequence[Sequence[int]], places: list[Point], guests: set[int], spacing: float
-) -> None:
-    """Unconnected neurons at the end of a rank stand close to their neighbour, two units off, not where the rank left
-    them."""
-    for rank in order:
-        for before, node in pairwise(rank):
-            own, other = levels.nodes[node], levels.nodes[before]
-            if own.members and own.members[0][0] in guests and node == rank[-1] and other.members:
-                beside = 2.0 if other.members[0][0] not in guests else 1.0
-                places[node] = (
-                    snap(places[before][0] + other.reach[0] + own.reach[0] + beside * spacing),
-                    places[node][1],
-                )
+    down = {i: rank[problem.edges[i].source] < rank[problem.edges[i].target] for i in bands.ways}
+    moved = {i: own[problem.edges[i].source] for i in layout.ways if i not in bands.ways}
+    return replace(
+        layout,
+        places={m: (x + own[m][0], y + own[m][1]) for m, (x, y) in layout.places.items()},
+        rects=[shifted(rect, shift[n]) for n, rect in zip(framed, layout.rects, strict=True)],
+        cut={i: line if down[i] else line[::-1] for i, line in bands.ways.items()},
+        firm=layout.firm - bands.ways.keys(),
+        ways={i: [Waypoint(w.x + dx, w.y + dy, w.half) for w in layout.ways[i]] for i, (dx, dy) in moved.items()},
+    )

@@ -6,7 +6,7 @@ have room in a gap of a larger one put there, the others packed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -16,7 +16,7 @@ import numpy as np
 from neurovis_layouts.formations import columns, grid
 from neurovis_layouts.label_room import excess
 from neurovis_layouts.layered.bands import UNCUT
-from neurovis_layouts.layered.component_layout import ComponentLayout, RankProblem, component_layout
+from neurovis_layouts.layered.component_layout import ComponentLayout, RankProblem
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.packing import gap_in, packed
 from neurovis_spec.layout import FloatArray
@@ -31,30 +31,21 @@ _MOST_PARTS = 50
 _STEP = 0.5
 
 
-def planned(frame: RankProblem) -> ComponentLayout:
-    """All components of a frame laid out and packed; units without connections beside the last rank of the largest one,
-    which alone stands in bands where these are wanted."""
-    problem, units, bonds, pair = frame.problem, frame.units, frame.bonds, frame.pair
-    connected, alone = ([list(range(len(units)))], []) if pair else components_of(problem, units, bonds)
+def planned(frame: RankProblem, laid_out: Callable[[RankProblem], ComponentLayout]) -> ComponentLayout:
+    """All components of a frame ``laid_out`` and packed; units without connections beside the last rank of the largest
+    one, which alone stands in bands where these are wanted."""
+    problem, units = frame.problem, frame.units
+    if frame.pair:
+        return laid_out(_component(frame, range(len(units))))
+    connected, alone = components_of(problem, units, frame.bonds)
     largest = max(connected, key=lambda part: sum(len(units[u].members) for u in part), default=None)
-    parts: list[ComponentLayout] = []
     hosts = _hosts(problem, units, connected, alone)
     few = sum(len(units[u].members) for u in alone) <= 6
-    owner = {m: u for u, unit in enumerate(units) for m in unit.members}
-    edges: dict[int, list[int]] = {}
-    part_of = {u: k for k, part in enumerate(connected) for u in part}
-    for i in frame.edges:
-        edge = problem.edges[i]
-        if owner[edge.source] in part_of:
-            edges.setdefault(part_of[owner[edge.source]], []).append(i)
-    for k, part in enumerate(connected):
+    parts: list[ComponentLayout] = []
+    for part in connected:
         guests = [units[u] for u in alone if few and hosts.get(u, largest) == part]
-        own, tied = [units[u] for u in part], [bonds[u] for u in part]
         wanted = frame.wanted if part == largest else UNCUT
-        part_problem = replace(frame, units=own, bonds=tied, edges=edges.get(k, []), wanted=wanted, guests=guests)
-        parts.append(component_layout(part_problem))
-    if pair:
-        return parts[0]
+        parts.append(laid_out(replace(_component(frame, part), wanted=wanted, guests=guests)))
     if alone and not (few and connected):
         parts.append(_unconnected(problem, [units[u] for u in alone]))
     plan = ComponentLayout()
@@ -64,6 +55,13 @@ def planned(frame: RankProblem) -> ComponentLayout:
     for whole, (x, y), (low, _) in zip(wholes, corners, extents, strict=True):
         plan.add(whole, (x - low[0], y - low[1]))
     return plan
+
+
+def _component(frame: RankProblem, part: Sequence[int]) -> RankProblem:
+    """The problem of some of the units of a frame."""
+    own = {m for u in part for m in frame.units[u].members}
+    edges = [i for i in frame.edges if frame.problem.edges[i].source in own]
+    return replace(frame, units=[frame.units[u] for u in part], bonds=[frame.bonds[u] for u in part], edges=edges)
 
 
 def components_of(

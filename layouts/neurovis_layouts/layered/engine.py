@@ -1,55 +1,115 @@
-"""The layered engine: from a problem to a layout.
+"""The layered engine: its phases, in the order in which they are carried out.
 
-In: a LayoutProblem. Out: a Layout, or what would be refused. After Sugiyama, Tagawa and Toda (1981), frame by frame
-from the inside out (``hierarchy``); in a frame units and blocks (``units``), what shares a rank (``same_rank``),
-components (``components``), their ranks, order and places (``component_layout``), pins (``pinning``), routes
-(``frame_routing``). Every stage is deterministic and computes in plain IEEE arithmetic, so the result is the same
-everywhere.
+In: a frame of a network, or a component of what is in it. Out: where everything in it stands. After Sugiyama, Tagawa
+and Toda (1981), frame by frame from the inside out (``hierarchy``). A phase takes what those before it have made of a
+frame (``frame_layout``) or a component (``component_layout``), and adds something; what is said beside it is when it is
+carried out. Every phase is deterministic and computes in plain IEEE arithmetic, so the result is the same everywhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable
+from functools import partial
+from typing import TypeAlias, TypeVar
 
-from neurovis_layouts.frame import from_picture
-from neurovis_layouts.layered.hierarchy import Composer
-from neurovis_spec.layout.model import Layout, LayoutProblem, Point
+from neurovis_layouts.layered import component_layout as components
+from neurovis_layouts.layered import frame_layout as frames
+from neurovis_layouts.layered.component_layout import Component, ComponentLayout, RankProblem
+from neurovis_layouts.layered.frame_layout import Frame
+from neurovis_layouts.layered.frame_routing import Standing
 
-
-def drawn(problem: LayoutProblem, engine: str) -> Layout:
-    """The layout of a problem as if there were no earlier one. Raises LayoutRefusalError for what cannot be met."""
-    if not problem.neurons:
-        return Layout(problem.network, engine, {}, {})
-    return Composer(_framed(problem)).whole().layout(problem, engine)
-
-
-def checked(problem: LayoutProblem) -> None:
-    """Raises the LayoutRefusalError that ``drawn`` would. Only pins and lines need places for it, and for these no
-    connection between frames has to be routed."""
-    if not problem.neurons:
-        return
-    composer = Composer(_framed(problem))
-    composer.check_mirrors()
-    if problem.pins or problem.align or any(module.pins or module.origin is not None for module in problem.modules):
-        composer.whole(routed=False)
+T = TypeVar("T")
+#: What is done, and when.
+Phases: TypeAlias = tuple[tuple[Callable[[T], T], Callable[[T], object]], ...]
 
 
-def _framed(problem: LayoutProblem) -> LayoutProblem:
-    """Pins in the engine's frame: x across, y along."""
+def _always(_: object) -> bool:
+    return True
 
-    def in_frame(pins: Mapping[int, Point]) -> dict[int, Point]:
-        return {i: from_picture(point, problem.direction) for i, point in pins.items()}
 
-    return replace(
-        problem,
-        pins=in_frame(problem.pins),
-        modules=tuple(
-            replace(
-                m,
-                pins=in_frame(m.pins),
-                origin=None if m.origin is None else from_picture(m.origin, problem.direction),
-            )
-            for m in problem.modules
-        ),
-    )
+def _paired(found: Component) -> object:
+    return found.part.pair
+
+
+def _unpaired(found: Component) -> object:
+    return not found.part.pair
+
+
+def _in_folds(found: Component) -> object:
+    return found.folds.ranks
+
+
+def _in_columns(found: Component) -> object:
+    return found.columns
+
+
+def _plain(found: Component) -> object:
+    return found.partner is None and not found.columns
+
+
+def _with_guests(found: Component) -> object:
+    return found.part.guests
+
+
+#: A component that has its ranks.
+RANKS: Phases[Component] = (
+    (components.with_axis, _paired),
+    (components.with_folds, _always),
+)
+ORDER: Phases[Component] = (
+    (components.with_levels, _always),
+    (components.with_rows_interleaved, _in_folds),
+    (components.with_spines, _in_columns),
+    (components.in_order, _unpaired),
+    (components.in_symmetric_order, _paired),
+    (components.with_straight_columns, _in_columns),
+    (components.with_crossings, _always),
+    (components.with_columns_tied, _in_columns),
+)
+PLACES: Phases[Component] = (
+    (components.with_reflections, _always),
+    (components.with_labels_at_ends, _always),
+    (components.with_places, _always),
+    (components.with_staggered_ranks, _plain),
+    (components.with_guests_drawn_in, _with_guests),
+    (components.with_neurons, _always),
+    (components.with_waypoints, _always),
+    (components.in_bands, _unpaired),
+    (components.with_labels, _always),
+)
+
+
+def component(part: RankProblem) -> ComponentLayout:
+    """A component in ranks: of all ways of cutting its loops the one that costs least in a draft."""
+    found = [_after(RANKS, one) for one in components.ranked(part)]
+    if len(found) > 1:
+        found = [min(found, key=lambda one: _after(ORDER, one.draft()).cost())]
+    return _after((*ORDER, *PLACES), found[0]).layout
+
+
+#: A frame on a page that is divided into rows and columns.
+PAGE: Phases[Frame] = (
+    (frames.with_page, _always),
+    (frames.with_pins, _always),
+)
+#: Any other, whose units stand in ranks.
+FRAME: Phases[Frame] = (
+    (frames.with_pieces, _always),
+    (frames.with_units, _always),
+    (frames.with_rows, _always),
+    (frames.with_bonds, _always),
+    (partial(frames.with_components, laid_out=component), _always),
+    (frames.with_pins, _always),
+)
+
+
+def stands(frame: Frame) -> Standing:
+    """Where everything in a frame stands."""
+    return _after(PAGE if frame.problem.plan else FRAME, frame).standing()
+
+
+def _after(phases: Phases[T], found: T) -> T:
+    for phase, when in phases:
+        if when(found):
+            found = phase(found)
+    return found
