@@ -280,14 +280,7 @@ class Insertion:
             for links, end, step in ((ups, last, -1), (downs, first, 1))
             for idle in (False, True)
         ]
-        length = sum(first - self.rank[self.links[c].upper] for c in ups)
-        length += sum(self.rank[self.links[c].lower] - last for c in downs)
-        options: list[tuple[int, int, Counts]] = []
-        for r in range(first, last + 1):
-            costs = sum((np.add.reduce(lines[r][1], 0) for lines, *_ in sides if lines), self._shut_to(r, node))
-            least = int(costs[costs.argmin()])
-            options.append((least * CROSSING + length + len(ups) * (r - first) + len(downs) * (last - r), r, costs))
-            self.work += 1
+        options = list(self._options(node, ups, downs, [lines for lines, *_ in sides if lines]))
         best = min(cost for cost, *_ in options)
         if best > most:
             return best
@@ -296,9 +289,8 @@ class Insertion:
         _, at, costs = options[choice]
         ties = np.flatnonzero(costs == costs.min())
         slot = int(ties[roll % len(ties)])
-        pair = dict.fromkeys((node, self.image[node]))
         added: Added = {at: []}
-        for behind, n in enumerate(pair):
+        for behind, n in enumerate(dict.fromkeys((node, self.image[node]))):
             self.rank[n] = at
             self._out.discard(n)
             there = len(self.order[at]) - slot if behind else slot
@@ -310,6 +302,20 @@ class Insertion:
                     self._lead(c, [slot, *self._way(lines, k, at, slot, step, idle)], at, step, added)
                     led.update((c, self._twin[c]))
         return self._insert(added, sorted(led))
+
+    def _options(
+        self, node: int, ups: Sequence[int], downs: Sequence[int], ways: Sequence[Lines]
+    ) -> Iterator[tuple[int, int, Counts]]:
+        """For each rank that a node may have what its connections up and down cost there at least, the rank, and what
+        they cross at each slot; ``ways`` are those of its connections."""
+        first, last = self._first(node), self._last(node)
+        length = sum(first - self.rank[self.links[c].upper] for c in ups)
+        length += sum(self.rank[self.links[c].lower] - last for c in downs)
+        for r in range(first, last + 1):
+            costs = sum((np.add.reduce(lines[r][1], 0) for lines in ways), self._shut_to(r, node))
+            least = int(costs[costs.argmin()])
+            yield least * CROSSING + length + len(ups) * (r - first) + len(downs) * (last - r), r, costs
+            self.work += 1
 
     def _costs_of(self, gap: int, idle: bool) -> Counts:
         """What a segment between two ranks costs; one that is ``idle`` counts as the one whose image it is."""

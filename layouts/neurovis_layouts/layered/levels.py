@@ -17,7 +17,7 @@ order of those that stand before it, what is nobody's image stands in the middle
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
@@ -95,24 +95,35 @@ def levels_of(
 ) -> Levels:
     """Levels of these units; ``rank`` is by position in ``units``; ``edges`` are the indices of theirs; ``columns`` are
     the boxes to which their neurons belong before all others."""
-    levels = Levels()
     height = max(rank, default=-1) + 1
-    levels.ranks = [[] for _ in range(height)]
-    levels.segments = [[] for _ in range(max(0, height - 1))]
+    levels = Levels(ranks=[[] for _ in range(height)], segments=[[] for _ in range(max(0, height - 1))])
     where: dict[int, tuple[int, float]] = {}
     boxes = {m: number for number, (_, members) in enumerate(problem.boxes) for m in reversed(members)}
     boxes.update({m: number for number in sorted(columns) for m in problem.boxes[number][1]})
     groups = {m: number for number, group in enumerate(problem.groups) for m in group.members}
-    sides = sides_of(problem)
-    paired = {m for mirror in problem.mirrors for pair in mirror.pairs for m in pair}
-    on_axis = {m for m in range(len(problem.neurons)) if problem.labels and problem.mirrors and m not in paired}
-    reading = problem.reading()
+    sides, reading = _aside_on(problem), problem.reading()
     for unit, level in sorted(zip(units, rank, strict=True), key=lambda pair: min(reading[m] for m in pair[0].members)):
         for node in _nodes(problem, unit, level, boxes, groups):
-            if len(node.members) == 1 and node.reach[0] and not node.framed and node.members[0][0] not in on_axis:
+            if len(node.members) == 1 and node.reach[0] and not node.framed and node.members[0][0] in sides:
                 node = _aside(node, sides[node.members[0][0]])
             index = add(levels, node)
             where.update({member: (index, dx) for member, dx, _ in node.members})
+    for i, ends in _near(problem, edges, levels, where):
+        connect(levels, i, ends)
+    return levels
+
+
+def _aside_on(problem: LayoutProblem) -> dict[int, Side | None]:
+    """On which side of its disc the label of each neuron stands that need not be in the middle, as on an axis."""
+    paired = {m for mirror in problem.mirrors for pair in mirror.pairs for m in pair}
+    free = paired if problem.labels and problem.mirrors else range(len(problem.neurons))
+    return {m: side for m, side in enumerate(sides_of(problem)) if m in free}
+
+
+def _near(
+    problem: LayoutProblem, edges: Sequence[int], levels: Levels, where: Mapping[int, tuple[int, float]]
+) -> list[tuple[int, Ends]]:
+    """The edges between ranks, and where they end, but for the longest, where they would have too many passages."""
     spans: list[tuple[int, int, Ends]] = []
     for i in edges:
         one, other = where[problem.edges[i].source], where[problem.edges[i].target]
@@ -120,10 +131,8 @@ def levels_of(
         if span := levels.nodes[lower[0]].rank - levels.nodes[upper[0]].rank:
             spans.append((span, i, (*upper, *lower)))
     passages = accumulate(span - 1 for span, *_ in sorted(spans))
-    near = [one for one, many in zip(sorted(spans), passages, strict=True) if many <= _MOST_PASSAGES]
-    for _, i, ends in sorted(near, key=itemgetter(1)):
-        connect(levels, i, ends)
-    return levels
+    near = [(i, ends) for (_, i, ends), many in zip(sorted(spans), passages, strict=True) if many <= _MOST_PASSAGES]
+    return sorted(near, key=itemgetter(0))
 
 
 def _nodes(problem: LayoutProblem, unit: Unit, rank: int, boxes: dict[int, int], groups: dict[int, int]) -> list[Node]:

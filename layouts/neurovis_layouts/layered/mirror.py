@@ -30,15 +30,8 @@ def mirrored(
 ) -> tuple[Levels, Order, list[int]]:
     """The levels, the symmetric order, and the image of each node; ``free`` nodes may have moved to other ranks, with
     their images. Of a ``draft`` only lengths matter. Adds passages to the levels."""
-    first = {a for mirror in problem.mirrors for a, _ in mirror.pairs}  # of two as they were written
     where = {m: (n, dx) for n, node in enumerate(levels.nodes) for m, dx, _ in node.members}
-    side: dict[int, int] = {}
-    for n, members in enumerate(node.members for node in levels.nodes):
-        if own := [m for m, _, _ in members]:
-            image = where[pair.get(own[0], own[0])][0]
-            side[n] = 0 if image == n else -1 if own[0] in first else 1
-            if side[n] or symmetric(own, pair):
-                levels.images[n] = image
+    side = _half(problem, levels, pair, where)
     fixed = {n for n, image in levels.images.items() if n == image}
     _match(problem, levels, pair, side)
     within = _within(problem, levels, where)
@@ -52,11 +45,21 @@ def mirrored(
     _forget_idle(levels)
     for rank in order:
         _about(levels, rank, side, fixed)
-    result: list[int] = [0] * len(levels.nodes)
-    for rank in order:
-        for n, other in zip(rank, rank[::-1], strict=True):
-            result[n] = other
-    return levels, order, result
+    image = {n: other for rank in order for n, other in zip(rank, rank[::-1], strict=True)}
+    return levels, order, [image.get(n, 0) for n in range(len(levels.nodes))]
+
+
+def _half(problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], where: Mapping[int, _End]) -> dict[int, int]:
+    """On which side each node stands, of two as they were written, 0 where it is its own image; notes the images."""
+    first = {a for mirror in problem.mirrors for a, _ in mirror.pairs}
+    side: dict[int, int] = {}
+    for n, own in enumerate([m for m, _, _ in node.members] for node in levels.nodes):
+        if own:
+            image = where[pair.get(own[0], own[0])][0]
+            side[n] = 0 if image == n else -1 if own[0] in first else 1
+            if side[n] or symmetric(own, pair):
+                levels.images[n] = image
+    return side
 
 
 def _forget_idle(levels: Levels) -> None:

@@ -67,16 +67,7 @@ def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, in
     """The number of the cell in which neurons stand together. What no cell names stands with what it has most
     connections with, images in the mirrored cell; what nothing leads to, below all."""
     seat = {cell.members: i for i, cell in enumerate(problem.plan)}
-    taken = {m for members in seat for m in members}
-    loose: list[_Members] = []
-    for members in [
-        *(m.members for m in problem.modules if m.parent < 0),
-        *sorted((own for _, own in problem.boxes), key=lambda own: (-len(own), own)),
-        *((m,) for m in range(len(problem.neurons))),
-    ]:
-        if members and taken.isdisjoint(members):
-            loose.append(members)
-            taken.update(members)
+    loose = _loose(problem, seat)
     owner = {m: members for members in [*seat, *loose] for m in members}
     near: dict[_Members, Counter[_Members]] = {members: Counter() for members in owner.values()}
     for edge in problem.edges:
@@ -89,16 +80,30 @@ def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, in
     while pulls:
         members = max(pulls, key=lambda one: (pulls[one][0], [-m for m in one]))
         many, to = pulls.pop(members)
-        image = owner.get(pair.get(members[0], -1), members)
         seat[members] = to if many else below
         seated = [members]
-        if image in pulls:
+        image = owner.get(pair.get(members[0], -1), members)
+        if pulls.pop(image, None):
             seat[image] = mirrored[to] if many else below
-            pulls.pop(image)
             seated.append(image)
         for other in {other for one in seated for other in near[one] if other in pulls}:
             pulls[other] = _pull(near[other], seat, cells[other])
     return _together(problem, seat)
+
+
+def _loose(problem: LayoutProblem, seat: Mapping[_Members, int]) -> list[_Members]:
+    """What no cell names: instances, boxes, neurons, the outermost of them."""
+    taken = {m for members in seat for m in members}
+    found: list[_Members] = []
+    for members in [
+        *(m.members for m in problem.modules if m.parent < 0),
+        *sorted((own for _, own in problem.boxes), key=lambda own: (-len(own), own)),
+        *((m,) for m in range(len(problem.neurons))),
+    ]:
+        if members and taken.isdisjoint(members):
+            found.append(members)
+            taken.update(members)
+    return found
 
 
 def _cells(mirrored: Sequence[int], members: _Members, pair: Mapping[int, int]) -> frozenset[int]:

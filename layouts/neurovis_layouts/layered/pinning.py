@@ -52,28 +52,42 @@ def pinned(
     # as it is in the picture, and without memory: what that says is seen to later
     pins = {i: to_picture(point, problem.direction) for i, point in problem.pins.items()}
     turned = replace(problem, pins=pins, memory=None)
-    boxes = [piece.part.box for piece, _ in pieces if piece.part.box >= 0 and piece.part.module < 0]
-    frames = Frames(replace(turned, boxes=tuple(problem.boxes[box] for box in boxes)))
-    numbers = {own: number for number, own in reversed(list(enumerate(frames.members)))}
-    wholes = [
-        Whole(members, numbers.get(frozenset(members), -1), in_picture(rect, problem.direction))
-        for piece, move in pieces
-        for members, rect in _frames_of(piece, move)
-    ]
+    frames, wholes = _framed(turned, pieces)
     found = settled(turned, frames, [to_picture(point, problem.direction) for point in free], wholes)
     places = [from_picture(point, problem.direction) for point in found.at]
     dx, dy = from_picture(found.shift, problem.direction)
     held = {*pins, *(pair[i] for i in pins if i in pair)}
     _refuse(problem, [piece for piece, _ in pieces], found.at, held)
     moved = frozenset(i for i, (x, y) in enumerate(free) if places[i] != (x + dx, y + dy) or i in held)
+    return Settled(places, _redrawn(pieces, places, found.axis, redraw), (dx, dy), moved, found.axis)
+
+
+def _framed(problem: LayoutProblem, pieces: Sequence[tuple[Piece, Move]]) -> tuple[Frames, list[Whole]]:
+    """The frames of a problem as it is in the picture, and those of pieces, with what is in these."""
+    boxes = [piece.part.box for piece, _ in pieces if piece.part.box >= 0 and piece.part.module < 0]
+    frames = Frames(replace(problem, boxes=tuple(problem.boxes[box] for box in boxes)))
+    numbers = {own: number for number, own in reversed(list(enumerate(frames.members)))}
+    around = [frame for piece, move in pieces for frame in _frames_of(piece, move)]
+    return frames, [
+        Whole(members, numbers.get(frozenset(members), -1), in_picture(rect, problem.direction))
+        for members, rect in around
+    ]
+
+
+def _redrawn(
+    pieces: Sequence[tuple[Piece, Move]], places: Sequence[Point], axis: float, redraw: Redraw
+) -> list[tuple[Piece, Move]]:
+    """The pieces and the moves that take them to their places, those drawn anew whose neurons do not stand as they are
+    drawn, and their mirror images as reflections of them."""
     done: list[tuple[Piece, Move]] = []
     drawn: dict[tuple[int, int, tuple[Point, ...]], Piece] = {}
     for number, (piece, move) in enumerate(pieces):
         part, at = piece.part, [places[m] for m in piece.part.members]
-        if (fitting := _fitting(piece, move, at)) is None and part.image_of >= 0:
+        fitting = _fitting(piece, move, at)
+        if fitting is None and part.image_of >= 0:
             lead, ahead = done[part.image_of]
             piece = replace(lead, part=part)
-            fitting = shifted_by((2 * found.axis - ahead.shift[0], ahead.shift[1]), not ahead.mirrored)
+            fitting = shifted_by((2 * axis - ahead.shift[0], ahead.shift[1]), not ahead.mirrored)
         elif fitting is None:
             x, y = at[0]
             own = tuple((px - x, py - y) for px, py in at)
@@ -82,7 +96,7 @@ def pinned(
                 drawn[key] = redraw(piece, dict(enumerate(own)))
             piece, fitting = replace(drawn[key], part=part), shifted_by((x, y))
         done.append((piece, fitting))
-    return Settled(places, done, (dx, dy), moved, found.axis)
+    return done
 
 
 def _frames_of(piece: Piece, move: Move) -> Iterator[tuple[tuple[int, ...], Rect]]:

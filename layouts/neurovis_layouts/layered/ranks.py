@@ -108,16 +108,14 @@ def _cut(
     inside = set(loop)
     surplus = {unit: (0.5 if unit in first else 0.0) - (0.5 if unit in last else 0.0) for unit in loop}
     for unit in loop:
-        surplus[unit] += entered * any(other not in inside for other in graph.predecessors(unit))
-        surplus[unit] -= entered * any(other not in inside for other in graph.successors(unit))
-    came, went = dict.fromkeys(loop, 0), dict.fromkeys(loop, 0)
+        surplus[unit] += entered * (not inside.issuperset(graph.predecessors(unit)))
+        surplus[unit] -= entered * (not inside.issuperset(graph.successors(unit)))
+    within: nx.DiGraph[int] = graph.subgraph(loop)
+    came, went = dict(within.in_degree()), dict(within.out_degree())
     for unit in loop:
-        for other in graph.successors(unit):
-            if other in inside:
-                surplus[unit] += arcs[unit, other]
-                surplus[other] -= arcs[unit, other]
-                went[unit] += 1
-                came[other] += 1
+        for other in within.successors(unit):
+            surplus[unit] += arcs[unit, other]
+            surplus[other] -= arcs[unit, other]
     head: list[int] = []
     tail: list[int] = []
     reached = dict.fromkeys(loop, 0.0)  # among equals, what the head drives most comes next
@@ -128,23 +126,18 @@ def _cut(
         if sinks:
             chosen = sinks[-1]
             tail.append(chosen)
-        elif sources:
-            chosen = sources[0]
-            head.append(chosen)
         else:
-            chosen = max(left, key=lambda unit: (surplus[unit], reached[unit], -unit))
+            chosen = sources[0] if sources else max(left, key=lambda unit: (surplus[unit], reached[unit], -unit))
             head.append(chosen)
         left.remove(chosen)
         inside.discard(chosen)
-        for other in graph.successors(chosen):
-            if other in inside:
-                surplus[other] += arcs[chosen, other]
-                reached[other] += arcs[chosen, other]
-                came[other] -= 1
-        for other in graph.predecessors(chosen):
-            if other in inside:
-                surplus[other] -= arcs[other, chosen]
-                went[other] -= 1
+        for other in inside.intersection(within.successors(chosen)):
+            surplus[other] += arcs[chosen, other]
+            reached[other] += arcs[chosen, other]
+            came[other] -= 1
+        for other in inside.intersection(within.predecessors(chosen)):
+            surplus[other] -= arcs[other, chosen]
+            went[other] -= 1
     return head + tail[::-1]
 
 

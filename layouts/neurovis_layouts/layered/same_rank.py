@@ -6,8 +6,9 @@ with their lifts, and for each a number (its bond) that is the same for all unit
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import permutations
 
 import networkx as nx
 
@@ -104,30 +105,36 @@ def _stairs(
     if len(mates) > _MOST_IN_STAIRS:
         return [] if any(flow.has_edge(a, b) for a in mates for b in mates) else [0.0] * len(mates)
     after = {mate: nx.descendants(flow, mate) for mate in mates}
-    ahead = {(a, b) for a in mates for b in mates if a != b and b in after[a] and a not in after[b]}
+    ahead = {(a, b) for a, b in permutations(mates, 2) if b in after[a] and a not in after[b]}
     if not ahead:
         return [0.0] * len(mates)
     steps: dict[tuple[int, int], float] = {}
-    own = set(mates)
-    for edge in problem.edges:
-        ends = (edge.source, edge.target)
-        if pair and (owner[ends[0]] not in own or owner[ends[1]] not in own):
-            ends = pair.get(ends[0], -1), pair.get(ends[1], -1)
-        a, b = owner.get(ends[0], -1), owner.get(ends[1], -1)
-        if (a, b) in ahead:
-            steps[a, b] = max(steps.get((a, b), 0.0), depth[ends[0]] - depth[ends[1]] + problem.rank_spacing / 2)
+    for a, b in _ends(problem, owner, pair, mates):
+        step = owner.get(a, -1), owner.get(b, -1)
+        if step in ahead:
+            steps[step] = max(steps.get(step, 0.0), depth[a] - depth[b] + problem.rank_spacing / 2)
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(mates)
     graph.add_edges_from(steps)
     found = dict.fromkeys(mates, 0.0)
     for mate in nx.lexicographical_topological_sort(graph):
-        for before in graph.predecessors(mate):
-            found[mate] = max(found[mate], found[before] + steps[before, mate])
+        found[mate] = max([0.0, *(found[before] + steps[before, mate] for before in graph.predecessors(mate))])
     high = max((units[mate].reach or (0.0, 0.0))[1] for mate in mates)
     through_others = any(not nx.has_path(graph, a, b) for a, b in ahead)
     if through_others or max(found.values()) > _STEEPEST * 2 * high * (len(mates) - 1):
         return []
     return [found[mate] for mate in mates]
+
+
+def _ends(
+    problem: LayoutProblem, owner: Mapping[int, int], pair: Mapping[int, int], mates: Sequence[int]
+) -> Iterator[tuple[int, int]]:
+    """The ends of each connection, or, where these are not both of a family, of its mirror image."""
+    for edge in problem.edges:
+        if pair and not {owner[edge.source], owner[edge.target]} <= set(mates):
+            yield pair.get(edge.source, -1), pair.get(edge.target, -1)
+        else:
+            yield edge.source, edge.target
 
 
 def driven(

@@ -188,21 +188,25 @@ def _with_hubs(problem: LayoutProblem, found: Sequence[Unit], lines: Mapping[int
     rings = [(unit, centre) for unit, centre in blocks if centre is not None]
     if not rings:
         return list(found)
-    image, near = mirror_images(problem), _graph(problem, range(len(problem.neurons)))
+    near = _graph(problem, range(len(problem.neurons)))
     single = {unit.members[0] for unit in found if len(unit.members) == 1 and unit.places is None}
     mates = {m: near.succ[m].keys() & near.pred[m].keys() for unit, _ in rings for m in unit.members}
     among = [sorted(single.intersection(*(mates[m] for m in unit.members))) for unit, _ in rings]
     times = Counter(m for some in among for m in some)
-    hubs: list[Unit] = []
-    for (unit, centre), some in zip(rings, among, strict=True):
-        if len(some) != 1 or times[some[0]] > 1 or some[0] in problem.pins or some[0] in lines:
-            continue
-        whole, first = (*unit.members, some[0]), unit.members[0]
-        together = all(len(set(own).intersection(whole)) in (0, len(whole)) for _, own in problem.boxes)
-        if together and (some[0] in image) == (image.get(first, first) not in whole):
-            hubs.append(replace(unit, members=whole, places=(*(unit.places or ()), centre)))
+    hubs = [
+        replace(unit, members=(*unit.members, some[0]), places=(*(unit.places or ()), centre))
+        for (unit, centre), some in zip(rings, among, strict=True)
+        if len(some) == 1 and times[some[0]] == 1 and some[0] not in lines and _may_be_hub(problem, unit, some[0])
+    ]
     held = {member for unit in hubs for member in unit.members}
     return [*hubs, *(unit for unit in found if held.isdisjoint(unit.members))]
+
+
+def _may_be_hub(problem: LayoutProblem, ring: Unit, hub: int) -> bool:
+    """Whether a neuron may stand in a ring: it is not pinned, in the same boxes, and mirrored as the ring is."""
+    image, whole, first = mirror_images(problem), {*ring.members, hub}, ring.members[0]
+    together = all(len(whole.intersection(own)) in (0, len(whole)) for _, own in problem.boxes)
+    return together and hub not in problem.pins and (hub in image) == (image.get(first, first) not in whole)
 
 
 def _centre(places: Sequence[Point]) -> Point | None:
@@ -251,12 +255,7 @@ def _on_lines(
     touched = _touched([unit for unit in (*asked, *found) if unit.places is not None], lines)
     settled: list[Unit] = []
     for unit in found:
-        bound: dict[int, set[float]] = {}
-        for member, (_, along) in zip(unit.members, unit.places or (), strict=False):
-            if member in lines:
-                bound.setdefault(lines[member], set()).add(along)
-        bent = any(len(different) > 1 for different in bound.values())
-        if not bent and sum(touched[line] > 1 for line in bound) <= 1:
+        if not _contradicts(unit, lines, touched):
             settled.append(unit)
         elif _on_one(unit, lines):
             wide = max(problem.neuron_spacing, 0.65) * _LINE
@@ -269,6 +268,15 @@ def _on_lines(
         alone = all(touched[lines[member]] == 1 for member in unit.members if member in lines)
         result += [unit] if unit.places is not None or alone or _on_one(unit, lines) else apart(unit)
     return result
+
+
+def _contradicts(unit: Unit, lines: Mapping[int, int], touched: Mapping[int, int]) -> bool:
+    """Whether a block holds neurons of one line apart, or several lines on which others are."""
+    bound: dict[int, set[float]] = {}
+    for member, (_, along) in zip(unit.members, unit.places or (), strict=False):
+        if member in lines:
+            bound.setdefault(lines[member], set()).add(along)
+    return any(len(different) > 1 for different in bound.values()) or sum(touched[line] > 1 for line in bound) > 1
 
 
 def _touched(units: Iterable[Unit], lines: Mapping[int, int]) -> Counter[int]:
@@ -286,30 +294,32 @@ def _without_needless_loops(problem: LayoutProblem, found: list[Unit], lines: Ma
     makes, which is all that is in no loop of neurons and of rigid units."""
     owner = {member: i for i, unit in enumerate(found) for member in unit.members}
     # a rigid unit is drawn as one piece, as if it were a neuron
-    rigid = {member: -1 - i for i, unit in enumerate(found) if unit.places is not None for member in unit.members}
+    piece = {member: member for member in owner}
+    piece |= {member: -1 - i for i, unit in enumerate(found) if unit.places is not None for member in unit.members}
     wired = [way for e in problem.edges if e.source in owner and e.target in owner for way in e.ways]
-    pieces: nx.DiGraph[int] = nx.DiGraph()
-    pieces.add_nodes_from(rigid.get(member, member) for member in owner)
-    pieces.add_edges_from((rigid.get(a, a), rigid.get(b, b)) for a, b in wired)
-    loop_of = {piece: k for k, loop in enumerate(nx.strongly_connected_components(pieces)) for piece in loop}
     # units on one line are one, too
     tied: nx.Graph[int] = nx.Graph()
     tied.add_nodes_from(range(len(found)))
     tied.add_edges_from((owner[line], owner[m]) for m, line in lines.items() if m in owner and line in owner)
-    row = {i: min(part) for part in nx.connected_components(tied) for i in part}
-    quotient: nx.DiGraph[int] = nx.DiGraph()
-    quotient.add_nodes_from(row.values())
-    quotient.add_edges_from(
-        (row[owner[a]], row[owner[b]])
-        for a, b in wired
-        if loop_of[rigid.get(a, a)] != loop_of[rigid.get(b, b)] and row[owner[a]] != row[owner[b]]
-    )
-    looping = {first for loop in nx.strongly_connected_components(quotient) if len(loop) > 1 for first in loop}
+    first = {i: min(part) for part in nx.connected_components(tied) for i in part}
+    row = {member: first[i] for member, i in owner.items()}
+    loop_of = _loops(piece.values(), ((piece[a], piece[b]) for a, b in wired))
+    along = [(a, b) for a, b in wired if loop_of[piece[a]] != loop_of[piece[b]] and row[a] != row[b]]
+    loops = _loops(row.values(), ((row[a], row[b]) for a, b in along))
+    size = Counter(loops.values())
     result: list[Unit] = []
     for i, unit in enumerate(found):
-        whole = unit.places is not None or row[i] not in looping
+        whole = unit.places is not None or size[loops[first[i]]] == 1
         result += [unit] if whole else [Unit((member,)) for member in unit.members]
     return result
+
+
+def _loops(nodes: Iterable[int], arcs: Iterable[tuple[int, int]]) -> dict[int, int]:
+    """For each node the loop that it is in, alone or with others."""
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_nodes_from(nodes)
+    graph.add_edges_from(arcs)
+    return {node: number for number, loop in enumerate(nx.strongly_connected_components(graph)) for node in loop}
 
 
 def symmetric_units(problem: LayoutProblem, frames: Sequence[Unit], pair: Mapping[int, int]) -> list[Unit]:
@@ -368,16 +378,21 @@ def _on_axis(
     first = {a for mirror in problem.mirrors for a, _ in mirror.pairs}
     leads = [m for m in members if m in first and pair[m] in own]
     lone = [m for m in members if m not in pair]
-    twins = [(-x, y) in set(points) for x, y in left]
-    if len(leads) != len(left) or len(lone) != len(middle) or not all(twins):
-        names = problem.neurons
-        raise LayoutRefusalError(
-            "mirror-arrange",
-            f"'{names[members[0]]}' and those arranged with it as {how} cannot be mirror images of each other in it",
-            "arrange each side by itself",
-            tuple(names[m] for m in members),
-        )
+    even = {(-x, y) for x, y in left} <= set(points)
+    if not even or (len(leads), len(lone)) != (len(left), len(middle)):
+        raise _refused(problem, members, how)
     places: dict[int, Point] = dict(zip(lone, middle, strict=True))
     for one, (x, y) in zip(leads, left, strict=True):
         places[one], places[pair[one]] = (x, y), (-x, y)
     return Unit(tuple(members), tuple(places[m] for m in members))
+
+
+def _refused(problem: LayoutProblem, members: Sequence[int], how: Arrangement) -> LayoutRefusalError:
+    """What is said of an arrangement that cannot be symmetric."""
+    names = problem.neurons
+    return LayoutRefusalError(
+        "mirror-arrange",
+        f"'{names[members[0]]}' and those arranged with it as {how} cannot be mirror images of each other in it",
+        "arrange each side by itself",
+        tuple(names[m] for m in members),
+    )
