@@ -54,14 +54,16 @@ def test_of_too_many_connections_some_are_drawn_the_thick_ones_last_and_the_rest
     assert len(drawn) == 1000
     assert drawn == sorted(drawn)
     said = "1,600 of 2,600 connections are left out, the weakest that arrive at each neuron, to keep the rest readable"
-    assert scene.notes[0] == f"{said}; all: --full"
-    lost = ", ".join(note.removeprefix("left out: ") for note in scene.notes[1:])
-    assert re.fullmatch(r"(\d+ of \d+ class\d_neuron → class\d_neuron, ){6}\d+ of [\d,]+ in 10 others", lost)
-    assert sum(int(count) for count in re.findall(r"(\d+) of", lost)) == 1600
+    assert scene.notes == (f"{said}; all: --full",)
+    bundles = of_kind(scene, "pathway")
+    assert len(bundles) == 16
+    assert sum(int(group.data["count"]) for group in bundles.values()) == 1600
     shown = [shape.text for group in scene.groups for shape in group.shapes if isinstance(shape, Text)]
     assert set(scene.notes) <= set(shown)
     assert len(widths(scene_at(WORM, replace(whole.render, full=True)))) == 2600
-    assert not scene_at(WORM, replace(whole.render, full=True)).notes
+    full = scene_at(WORM, replace(whole.render, full=True))
+    assert not full.notes
+    assert not of_kind(full, "pathway")
     assert len(of_kind(scene, "neuron")) == 90
 
 

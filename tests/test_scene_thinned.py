@@ -1,5 +1,5 @@
-"""What stays of too many lines: every neuron and every pathway, what is most of what drives its target; and what is
-said of the rest is what is missing."""
+"""What stays of too many lines: every neuron and every pathway, what is most of what drives its target; and the bundles
+are of what is missing."""
 
 from __future__ import annotations
 
@@ -62,12 +62,6 @@ def seen_of(network: CompiledNetwork, most: int | None = None) -> Shown:
     return shown(whole, wanted, np.abs(whole.connections.weights.whole()), np.ones(len(whole.connections)))
 
 
-def told(notes: tuple[str, ...]) -> dict[tuple[str, str], tuple[int, int]]:
-    """How many lines are missing of how many, by the pathways that notes name."""
-    found = re.findall(r"([\d,]+) of ([\d,]+) ([A-Z])\d* → ([A-Z])", " ".join(notes))
-    return {(a, b): (int(few.replace(",", "")), int(of.replace(",", ""))) for few, of, a, b in found}
-
-
 @pytest.mark.parametrize("text", [RING, CELLS.replace("count: 30", "count: 25")], ids=["rings", "cells"])
 def test_no_pathway_is_gone_and_the_picture_says_of_which_some_are(text: str) -> None:
     network = nv.compile_text(text)
@@ -77,7 +71,8 @@ def test_no_pathway_is_gone_and_the_picture_says_of_which_some_are(text: str) ->
     there = pathways(network, np.ones(len(network.network.connections), bool))
     assert set(drawn) == set(there)
     assert len(names) == 1000
-    assert told(scene.notes) == {ends: (of - drawn[ends], of) for ends, of in there.items() if of > drawn[ends]}
+    bundles = {g.data["pathway"]: int(g.data["count"]) for g in scene.groups if "pathway" in g.data}
+    assert bundles == {" -> ".join(ends): of - drawn[ends] for ends, of in there.items() if of > drawn[ends]}
     for single in (("L", "L"), ("R", "R"), ("S", "E"), ("E", "O")):
         assert drawn[single] == there[single], "a single wire is much of what drives its target"
 
@@ -117,7 +112,7 @@ def network_of(counts: list[int], entries: list[tuple[str, str, str, str]]) -> C
     st.floats(0, 1),
 )
 @settings(max_examples=30, deadline=None)
-def test_neurons_and_pathways_keep_their_strongest_and_the_notes_say_the_rest(
+def test_neurons_and_pathways_keep_their_strongest_and_the_rest_is_left(
     counts: list[int], entries: list[tuple[str, str, str, str]], room: float
 ) -> None:
     network = network_of(counts, entries)
@@ -140,12 +135,11 @@ def test_neurons_and_pathways_keep_their_strongest_and_the_notes_say_the_rest(
     for source, target in there:
         own = (group[ends.sources.whole()] == source) & (group[ends.targets.whole()] == target)
         assert sizes[own & lines].max() == sizes[own].max()
+    assert (seen.left == ~lines).all()
     if most < count:
-        assert seen.notes[0].startswith(f"{count - most:,} of {count:,} connections are left out, the weakest that")
-        assert " all of " not in seen.notes[0]
-        if len(there) > 1:
-            lost = told(seen.notes)
-            assert lost == {one: (of - drawn[one], of) for one, of in there.items() if of > drawn[one]}
+        (note,) = seen.notes
+        assert note.startswith(f"{count - most:,} of {count:,} connections are left out, the weakest that")
+        assert " all of " not in note
     else:
         assert seen.notes == ()
 
@@ -165,7 +159,7 @@ def test_the_order_of_a_spec_decides_nothing(entries: list[tuple[str, str, str, 
 def test_where_nothing_is_kept_the_notes_say_so() -> None:
     network = network_of([3, 3, 3, 3], [("A", "B", "all_to_all", "1"), ("B", "C", "all_to_all", "1")])
     ends = network.network.connections
-    assert ", and all of 9 neurons and 2 pathways, to" in seen_of(network, 0).notes[0]
+    assert ", and all of 9 neurons, to" in seen_of(network, 0).notes[0]
     for most in range(1, 18):
         seen = seen_of(network, most)
         gone = 9 - len(set(ends.sources[seen.lines].tolist()) | set(ends.targets[seen.lines].tolist()))

@@ -22,6 +22,7 @@ from neurovis_spec.scene.fading import seconds_of, told_times
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Disc, Group, Point, Scene, Shape, Spline, Text, ended
+from neurovis_spec.scene.pathways import group_of
 from neurovis_spec.scene.plan import Plan
 from neurovis_spec.scene.shown_states import ShownStates
 from neurovis_spec.scene.signals import Signal, Signals
@@ -103,6 +104,7 @@ def paint(
         groups=(
             *planned.back,
             *_fainter(_connections(planned, seen, glowing, titles[1]), lesions_by_id(planned), step),
+            *planned.between,
             *_fainter(_neurons(planned, seen, titles[0]), lesions_by_id(planned), step),
             *planned.front,
             *said,
@@ -133,13 +135,15 @@ def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
     theme = planned.theme
     fills = colours(theme, seen.discs)
     groups, states = [], ShownStates(planned.network).called
-    names = planned.network.neurons.names
+    names, groups_of = planned.network.neurons.names, group_of(planned.network).tolist()
     for index in planned.depth or range(len(names)):
         name = names[index]
         disc = Disc(planned.centres[index], planned.radii[index], fills[index], theme.ring, planned.rings[index])
         label, data = planned.labels[index], {"neuron": name}
         if states[index]:
             data["state"] = states[index]
+        if planned.between:  # bundles speak of groups
+            data["group"] = planned.network.neurons.groups[groups_of[index]].name
         shapes: tuple[Shape, ...] = (disc,)
         if index in planned.sizes:
             data["size"] = str(planned.sizes[index])

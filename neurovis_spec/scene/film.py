@@ -80,15 +80,16 @@ def films(
     where other weights are reached. Of pathways that are ``laid_out_alone`` the layout may be None. Raises ValueError
     for a part without a snapshot."""
     drawn = gathered(network, settings.collapse, settings.pathways)
-    placed, planned, reached = laid_out(drawn, layout), None, np.zeros(0)
+    placed, planned, reached, begin = laid_out(drawn, layout), None, np.zeros(0), None
     for snapshots in parts:
         if not len(snapshots):
             raise ValueError("a film has at least one frame")
+        begin = next(iter(snapshots)) if begin is None else begin
         peaks = np.full(len(drawn.network.connections), np.nan)
         for snapshot in snapshots if len(network.changing) else islice(snapshots, 1):
             peaks = np.fmax(peaks, np.abs(drawn.snapshot(snapshot).weights))
         if planned is None or not np.array_equal(peaks, reached, equal_nan=True):
-            planned, reached = plan(drawn, placed, gains, settings, peaks, narrowest), peaks
+            planned, reached = plan(drawn, placed, gains, settings, peaks, narrowest, begin), peaks
         yield filmed(drawn, planned, snapshots, gains, fps)
 
 

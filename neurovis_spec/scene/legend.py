@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from neurovis_spec.scene import legend_scales, texts
+from neurovis_spec.scene import bundles, legend_scales, texts
+from neurovis_spec.scene.bundles import Told
 from neurovis_spec.scene.delays import bead
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.legend_scales import FIRST_Y, SAMPLE_Y, SECOND_Y, SMALL, LegendEntry, heading, stroke
@@ -56,6 +57,8 @@ class Contents:
     seen: str = ""
     #: whether texts beside lines say what pathways hold
     pathways: bool = False
+    #: what is said of the bundles of what is left out, None without any
+    bundles: Told | None = None
 
 
 def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = False) -> list[LegendEntry]:
@@ -67,6 +70,8 @@ def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = Fal
         result += legend_scales.thickness(gains, theme)
     if contents.ends is not None and contents.ends.kinds not in ((), (1,)) and theme.ends == "signs":
         result.append(_ends_in(contents.ends, theme))
+    if contents.bundles is not None:
+        result.append(_bundle(contents.bundles, theme))
     if contents.learns:
         result += legend_scales.glow(gains, theme)
     if contents.teaches:
@@ -174,6 +179,24 @@ def _ends_in(ends: Ends, theme: Theme) -> LegendEntry:
 def _room(word: float) -> float:
     """How much room there is across for a sample with a word beneath it: words of about its width stand in the gaps."""
     return _STROKE if word <= _STROKE + _STROKE_GAP else word + _STROKE_GAP
+
+
+def _bundle(told: Told, theme: Theme) -> LegendEntry:
+    """Bands as they excite and inhibit, and what the widest stands for."""
+    words = f"left out, added up: |Σ w| up to {texts.number(told.largest)}"
+    wide = [_room(texts.width(bundles.DOES[end], SMALL)) for end in told.ends]
+    across = max(sum(wide) + (len(wide) - 1) * _STROKE_GAP, texts.width(words, SMALL))
+    shapes: list[Shape] = [heading("Bundle", theme)]
+    x = 0.0
+    for end, room in zip(told.ends, wide, strict=True):
+        colour = bundles.ink(theme, end)
+        tip = Arrowhead((x + _STROKE, SAMPLE_Y), (1.0, 0.0), _HEAD, 0.0, "")
+        tip = ended(tip, 5.0, colour, end if theme.ends == "signs" else 1)
+        shapes += [stroke(x, tip.notch[0] - x, colour, 5.0), tip]
+        shapes.append(Text((x, FIRST_Y), bundles.DOES[end], SMALL, theme.muted))
+        x += room + _STROKE_GAP
+    shapes.append(Text((0, SECOND_Y), words, SMALL, theme.muted))
+    return LegendEntry(tuple(shapes), across)
 
 
 def _dotted(words: str, theme: Theme) -> LegendEntry:

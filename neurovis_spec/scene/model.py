@@ -210,8 +210,9 @@ Shape: TypeAlias = Disc | Spline | Polyline | Arrowhead | Rectangle | Ramp | Ima
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Shapes that belong together. ``id`` is opaque and unique ('' for none); ``data`` becomes ``data-…`` attributes;
-    ``title`` is what a pointer shows; ``opacity`` is that of the whole group, drawn by itself."""
+    """Shapes that belong together. ``id`` is opaque and unique ('' for none); ``data`` becomes ``data-…`` attributes,
+    but for a ``class``, which only what stays as it is in a film may have; ``title`` is what a pointer shows;
+    ``opacity`` is that of the whole group, drawn by itself."""
 
     shapes: tuple[Shape, ...]
     id: str = ""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,7 @@ from neurovis_spec.layout.labels import BESIDE, UNIT, label_rects, label_room
 from neurovis_spec.layout.model import RADIUS, Layout, Point, Side
 from neurovis_spec.layout.naming import natural_key
 from neurovis_spec.projection import called, nearness
-from neurovis_spec.scene import delays, encoding, legend, texts
+from neurovis_spec.scene import bundles, delays, encoding, legend, texts
 from neurovis_spec.scene.boxes import Box, boxes_of, entitled, outward
 from neurovis_spec.scene.caption import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
 from neurovis_spec.scene.collapse import Gathered
@@ -48,6 +49,7 @@ from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Shape, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.pathway_words import PathwayWords
+from neurovis_spec.scene.pathways import Pathway, pathways
 from neurovis_spec.scene.scaling import scaled, scaled_group
 from neurovis_spec.scene.shown import Shown, shown
 from neurovis_spec.scene.signals import Signals
@@ -55,6 +57,9 @@ from neurovis_spec.scene.spots import beyond
 from neurovis_spec.scene.teachers import Teacher, dash, dotted, drawn_teachers, fewer, label_of, room_of
 from neurovis_spec.scene.themes import theme_of, tints_of
 from neurovis_spec.scene.titles import Titled, elsewhere, in_one_place, outline
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.recording import Snapshot
 
 #: how high a line is that says what is left out; what texts keep of the picture's edge
 _NOTE_LINE, _EDGE = 16.0, 6.0
@@ -94,8 +99,9 @@ class Plan:
     #: what events remove, and when
     lesions: Lesions
     labels: tuple[Label | None, ...]
-    #: beneath the lines, and above the discs
+    #: beneath the lines, between these and the discs, and above the discs
     back: tuple[Group, ...]
+    between: tuple[Group, ...]
     front: tuple[Group, ...]
     captioned: bool
     #: user units in a page unit
@@ -121,19 +127,21 @@ def plan(
     settings: RenderSettings,
     peaks: FloatArray | None = None,
     narrowest: float = 0.0,
+    begin: Snapshot | None = None,
 ) -> Plan:
     """Arrange everything that stays the same. ``layout`` is that of what is drawn; ``peaks`` (m,) are the largest
-    magnitudes of its weights in what is drawn, by default those at first. Without a stated size the picture is at least
-    ``narrowest`` wide (page units). Raises KeyError for a theme that does not exist, RendererError for a path that is
-    none."""
+    magnitudes of its weights in what is drawn, by default those at first; ``begin`` is the first step of the whole that
+    is drawn, of which bundles have their sums, by default that before anything happens. Without a stated size the
+    picture is at least ``narrowest`` wide (page units). Raises KeyError for a theme that does not exist, RendererError
+    for a path that is none."""
     theme = theme_of(settings)
     weights = np.abs(drawn.network.connections.weights.whole()) if peaks is None else peaks
-    content = _content(drawn, layout, settings, weights)
+    content = _content(drawn, layout, settings, weights, begin)
     network, seen = content.network, content.seen
     widths = encoding.clamped(encoding.thickness(weights, gains.thickness)[seen.lines])
     framed = _framed(_Wanted(content, gains, settings, theme, narrowest), widths)
     frame, gains = framed.frame, in_pages(gains, framed.unit)
-    page = _on_page(content, framed, gains, layout)
+    page = _on_page(content, framed, gains, layout, theme)
     sizes = {unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]}
     said = _texts(content, page, settings, sizes)
     rings = np.minimum(2.5, 0.12 * page.radii)
@@ -155,6 +163,7 @@ def plan(
         lesions=content.lesions,
         labels=tuple(raised(said.labels, sizes)),
         back=(*_box_frames(page.boxes, frame, theme), *_dotted_groups(content, page, theme)),
+        between=_bundle_groups(network, page.bundles, theme, 0 if begin is None else begin.step),
         front=(
             *(
                 Group(backed(text) if content.said else (text,), id=f"label:{entry}")
@@ -185,6 +194,8 @@ class _Content:
     rooms: Mapping[int, Rect]
     sides: Mapping[int, Side]
     boxes: Sequence[Box]
+    #: the pathways of what is left out, the strongest first
+    left: Sequence[Pathway]
     #: who has a dotted line to whom
     teachers: Sequence[Teacher]
     lesions: Lesions
@@ -199,10 +210,13 @@ class _Content:
     near: FloatArray | None
 
 
-def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights: FloatArray) -> _Content:
+def _content(
+    drawn: Gathered, layout: Layout, settings: RenderSettings, weights: FloatArray, begin: Snapshot | None
+) -> _Content:
     network = drawn.network
     positions, routes = _in_units(network, layout)
     seen = shown(network, drawn.asked(settings), weights, _lengths(routes))
+    left, unsaid = bundles.strongest(network, _left(drawn, seen.left, begin))
     radii = np.array([radius_of(size) for size in drawn.sizes.tolist()]) * np.where(seen.focus, 1.0, _UNFOCUSED)
     near = nearness(network, layout.engine)
     radii = radii if near is None else radii * (_FAR + (1.0 - _FAR) * near)
@@ -224,15 +238,25 @@ def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights:
         rooms=rooms,
         sides=sides,
         boxes=boxes,
+        left=left,
         teachers=teachers,
         lesions=lesions,
         signals=signals,
         ends=ends,
-        notes=notes,
+        notes=(*notes, *unsaid),
         said=[words.beside(strand) for strand in drawn.strands or ()],
         extent=extent,
         near=near,
     )
+
+
+def _left(drawn: Gathered, some: npt.NDArray[np.bool_], begin: Snapshot | None) -> tuple[Pathway, ...]:
+    """The pathways of what is left out, with the weights and ends of a step."""
+    if not some.any():
+        return ()
+    whole = drawn.whole.connections.weights.whole() if begin is None else begin.weights
+    ends = drawn.ends(whole, None if begin is None else begin.ends)
+    return pathways(drawn.network, some, drawn.total(whole) if drawn.any else whole, ends, drawn.counts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -246,13 +270,14 @@ class _OnPage:
     radii: FloatArray
     lines: Mapping[int, Line]
     guides: Sequence[Line]
+    bundles: bundles.Bundles
     boxes: Sequence[Box]
     obstacles: Obstacles
     picture: Rect
     margin: float
 
 
-def _on_page(content: _Content, framed: _Framed, gains: Gains, layout: Layout) -> _OnPage:
+def _on_page(content: _Content, framed: _Framed, gains: Gains, layout: Layout, theme: Theme) -> _OnPage:
     network, frame = content.network, framed.frame
     boxes = entitled(content.boxes, content.positions, frame.scale, _rooms(network, layout, frame.scale))
     centres, radii = frame.map(content.positions), content.radii * frame.scale
@@ -272,7 +297,9 @@ def _on_page(content: _Content, framed: _Framed, gains: Gains, layout: Layout) -
         sector = box.sector
         obstacles.add_frame(outline(_mapped(box.rect, frame)) if sector is None else frame.map(sector.border(0.1)))
     drawn = dict(zip(kept, lines, strict=True))
-    return _OnPage(frame, centres, radii, drawn, guides, boxes, obstacles, picture, framed.margin)
+    ground = bundles.Ground(network, centres, radii, _titled_groups(network, boxes), obstacles, picture)
+    bands = bundles.bundled(content.left, ground, theme)
+    return _OnPage(frame, centres, radii, drawn, guides, bands, boxes, obstacles, picture, framed.margin)
 
 
 @dataclass(frozen=True, slots=True)
@@ -355,6 +382,7 @@ def _in_user_units(made: Plan, unit: float) -> Plan:
         beads={index: scaled(bead, unit) for index, bead in made.beads.items()},
         labels=tuple(label and scaled(label, unit) for label in made.labels),
         back=tuple(scaled_group(group, unit) for group in made.back),
+        between=tuple(scaled_group(group, unit) for group in made.between),
         front=tuple(scaled_group(group, unit) for group in made.front),
         unit=unit,
     )
@@ -527,6 +555,7 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
             unit=network.dt_unit,
             seen="" if content.near is None else called(network.layout.view),
             pathways=bool(content.said) and settings.labels,
+            bundles=bundles.told(content.left),
         )
         for brief in (False, True):
             items = legend.entries(contents, gains, theme, brief=brief)
@@ -647,6 +676,17 @@ def _foreign(box: Box, boxes: Sequence[Box], frame: Frame) -> tuple[Rect, ...]:
 def _mapped(rect: Rect, frame: Frame) -> Rect:
     (x0, y0), (x1, y1) = frame.map(np.array([rect[:2], rect[2:]])).tolist()
     return x0, y0, x1, y1
+
+
+def _titled_groups(network: Network, boxes: Sequence[Box]) -> frozenset[str]:
+    """The groups that are all of a box, whose title is their name."""
+    held = {tuple(sorted(box.members)) for box in boxes}
+    return frozenset(group.name for group in network.neurons.groups if tuple(group.indices) in held)
+
+
+def _bundle_groups(network: Network, left: bundles.Bundles, theme: Theme, step: int) -> tuple[Group, ...]:
+    names = (Group(left.names, id="hubs"),) if left.names else ()
+    return (*(bundles.drawn(network, one, theme, step) for one in left.all), *names)
 
 
 def _dotted_groups(content: _Content, page: _OnPage, theme: Theme) -> list[Group]:

@@ -4,7 +4,7 @@ In: a network, what the author or the reader asks to see, how long lines are. Ou
 as in the whole picture; the rest is left out, and neurons out of focus are small. Where there are more lines than a
 picture has room for, a line counts as much as it is of all that arrives at its target, so that what is drawn is as much
 as can be of what drives each neuron; and a neuron, a pathway (what runs from one group to another) and an entry keep
-their strongest.
+their strongest. What of a pathway is left out then is drawn as a bundle (``scene/bundles``).
 """
 
 from __future__ import annotations
@@ -18,8 +18,6 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.called import names_of, unit_of
-from neurovis_spec.scene.caption import CAPTION
 from neurovis_spec.scene.pathways import group_of, numbered
 from neurovis_spec.scene.renderers import RendererError
 
@@ -27,13 +25,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 #: With more connections than this nobody can follow one, and the weakest are left out.
 _ALL = 2500
-#: Then so many are drawn, or so many a neuron where there are many of these; of more than the last a picture shows
-#: nothing.
-_MOST_LINES, _LINES_EACH, _MOST_OF_ALL = 1000, 2, 5000
-#: How wide a note is at most that could be two, in page units.
-_ROOM = 780.0
-#: so many pathways are named that lost lines
-_NAMED = 6
+#: Then so many are drawn, or so many a neuron where there are many of these, but no more than where all are.
+_MOST_LINES, _LINES_EACH = 1000, 2
 #: lengths are compared to so many decimals of a layout's unit: what is alike in a picture is so by rounding alone
 _DECIMALS = 6
 
@@ -46,11 +39,12 @@ class LeftOut(UserWarning):
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """``lines`` (m,) are drawn; neurons that are not in ``focus`` (n,) are small and have no label; ``notes`` are lines
-    of text that say so."""
+    """``lines`` (m,) are drawn; for those ``left`` (m,) there is no room; neurons that are not in ``focus`` (n,) are
+    small and have no label; ``notes`` are lines of text that say so."""
 
     lines: BoolArray
     focus: BoolArray
+    left: BoolArray
     notes: tuple[str, ...]
 
 
@@ -59,6 +53,7 @@ def shown(network: Network, settings: RenderSettings, weights: FloatArray, lengt
     ``lengths`` those of its routes. Raises RendererError."""
     lines, focus = np.ones(len(network.connections), bool), np.ones(len(network.neurons), bool)
     notes: list[str] = []
+    left = np.zeros(len(lines), bool)
     if settings.focus is not None:
         name, members = settings.focus
         lines, focus, words = _focused(network, name, np.array(members, np.int64))
@@ -78,8 +73,9 @@ def shown(network: Network, settings: RenderSettings, weights: FloatArray, lengt
     if most is not None and int(lines.sum()) > most:
         before, lines = lines, thinned(network, lines, weights, lengths, most)
         why = "to keep the file below 5 MB" if settings.most is not None else "to keep the rest readable"
-        notes += _thinned_out(network, before, lines, why)
-    return Shown(lines, focus, tuple(notes))
+        notes.append(_thinned_out(network, before, lines, why))
+        left[network.connections.with_twins(np.flatnonzero(before & ~lines))] = True
+    return Shown(lines, focus, left, tuple(notes))
 
 
 def _once(network: Network, lines: BoolArray) -> BoolArray:
@@ -108,7 +104,7 @@ def _most(network: Network, settings: RenderSettings) -> int | None:
     return (
         None
         if len(network.connections) - len(network.connections.second) <= _ALL
-        else min(max(_MOST_LINES, _LINES_EACH * len(network.neurons)), _MOST_OF_ALL)
+        else min(max(_MOST_LINES, _LINES_EACH * len(network.neurons)), _ALL)
     )
 
 
@@ -116,20 +112,12 @@ def _left_out(count: int, of: int, pathways: bool = False) -> str:
     return f"{count:,} of {of:,} {'pathways' if pathways else 'connections'} are left out"
 
 
-def _thinned_out(network: Network, before: BoolArray, lines: BoolArray, why: str) -> list[str]:
+def _thinned_out(network: Network, before: BoolArray, lines: BoolArray, why: str) -> str:
     """What is said where these lines stay of those before."""
     few = _left_out(int(before.sum() - lines.sum()), int(before.sum()))
-    bared = zip(bare(network, before, lines), ("neuron", "pathway"), strict=True)
-    gone = " and ".join(_count(number, what) for number, what in bared if number)
-    gone = f", and all of {gone}" if gone else ""
-    notes = [f"{few}, the weakest that arrive at each neuron{gone}, {why}; all: --full"]
-    for lost in losses(network, before, lines):
-        longer = f"{notes[-1]}, {lost}"
-        if len(notes) > 1 and texts.width(longer, CAPTION) <= _ROOM:
-            notes[-1] = longer
-        else:
-            notes.append(f"left out: {lost}")
-    return notes
+    bared = bare(network, before, lines)
+    gone = f", and all of {_count(bared, 'neuron')}" if bared else ""
+    return f"{few}, the weakest that arrive at each neuron{gone}, {why}; all: --full"
 
 
 def _focused(network: Network, name: str, members: IntArray) -> tuple[BoolArray, BoolArray, str]:
@@ -245,14 +233,15 @@ def _shares(network: Network, sizes: FloatArray) -> FloatArray:
 
 def _ranks(network: Network, order: IntArray) -> IntArray:
     """Who comes first, of connections in this order: 0 the strongest that arrives at a neuron, or that it sends where
-    nothing arrives; 1 that of a pathway; 2 that of an entry; 3 those of each neuron in each of its pathways; 4 the
-    rest."""
+    nothing arrives; 1 that of a pathway; 2 that of an entry; 3 the strongest that a neuron sends; 4 those of each
+    neuron in each of its pathways; 5 the rest."""
     ends, group, groups = network.connections, group_of(network), len(network.neurons.groups)
     sources, targets = ends.sources[order], ends.targets[order]
-    ranks = np.full(len(order), 4, np.int64)
+    ranks = np.full(len(order), 5, np.int64)
     for rank, same in (
-        (3, sources * groups + group[targets]),
-        (3, targets * groups + group[sources]),
+        (4, sources * groups + group[targets]),
+        (4, targets * groups + group[sources]),
+        (3, sources),
         (2, ends.entry[order]),
         (1, numbered(network)[order]),
         (0, targets),
@@ -268,31 +257,8 @@ def _first(values: IntArray) -> IntArray:
     return np.unique(values, return_index=True)[1]
 
 
-def losses(network: Network, lines: BoolArray, kept: BoolArray) -> list[str]:
-    """Which pathways lost how many of the ``lines`` where these are ``kept``, those that lost most first, the last of
-    them together; what several instances of a module have is one. Nothing where there is one pathway."""
-    names, groups = names_of(network).called, network.neurons.groups
-    called = [names[unit_of(group)] for group in groups]
-    numbers, members = np.unique(numbered(network)[lines], return_inverse=True)
-    lost, of = np.bincount(members, ~kept[lines]).astype(np.int64), np.bincount(members)
-    found: dict[tuple[str, str], tuple[int, int]] = {}
-    for number, fewer, count in zip(numbers.tolist(), lost.tolist(), of.tolist(), strict=True):
-        source, target = divmod(number, len(groups))
-        ends = called[source], called[target]
-        before = found.get(ends, (0, 0))
-        found[ends] = before[0] + fewer, before[1] + count
-    if len(found) < 2:
-        return []
-    ordered = sorted((-fewer, count, *ends) for ends, (fewer, count) in found.items() if fewer)
-    said = [f"{-fewer:,} of {count:,} {source} → {target}" for fewer, count, source, target in ordered[:_NAMED]]
-    if rest := ordered[_NAMED:]:
-        fewer, count = -sum(one[0] for one in rest), sum(one[1] for one in rest)
-        said.append(f"{fewer:,} of {count:,} in {len(rest):,} other{'s' * (len(rest) > 1)}")
-    return said
-
-
-def bare(network: Network, lines: BoolArray, kept: BoolArray) -> tuple[int, int]:
-    """How many neurons and how many pathways have lines of which none is kept."""
-    ends, pathways = network.connections, numbered(network)
+def bare(network: Network, lines: BoolArray, kept: BoolArray) -> int:
+    """How many neurons have lines of which none is kept."""
+    ends = network.connections
     before, after = (np.union1d(ends.sources[some], ends.targets[some]) for some in (lines, kept))
-    return len(before) - len(after), len(np.unique(pathways[lines])) - len(np.unique(pathways[kept]))
+    return len(before) - len(after)

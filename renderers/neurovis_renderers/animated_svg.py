@@ -119,7 +119,7 @@ class _Writer:
             return self._connection(group, self._lines[group.id])
         if group.id in self._film.redrawn:
             return self._redrawn(group)
-        return unchanging(group)
+        return unchanging(group, _class(_FIXED))
 
     def _letter(self, level: int) -> str:
         self._letters.add(level)

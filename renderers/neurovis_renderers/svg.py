@@ -196,9 +196,10 @@ def _text(shape: Text, attributes: str, content: str) -> str:
     )
 
 
-def unchanging(group: Group) -> str:
-    """A group as it is drawn where nothing of it changes; without what a group would say, its shapes alone."""
-    shapes = "".join(element(shape) for shape in group.shapes)
+def unchanging(group: Group, attributes: str = "") -> str:
+    """A group as it is drawn where nothing of it changes; without what a group would say, its shapes alone. Each shape
+    of one that has a class gets the ``attributes``."""
+    shapes = "".join(element(shape, attributes if "class" in group.data else "") for shape in group.shapes)
     if not group.title and not group.data and group.opacity == 1:
         return shapes + "\n"
     return f"{open_group(group)}{shapes}</g>\n"
@@ -206,7 +207,7 @@ def unchanging(group: Group) -> str:
 
 def open_group(group: Group, attributes: str = "") -> str:
     """The start of a group, with its data attributes and its title."""
-    data = "".join(f" data-{key}={quoted(value)}" for key, value in group.data.items())
+    data = "".join(f" {key if key == 'class' else f'data-{key}'}={quoted(value)}" for key, value in group.data.items())
     title = f"<title>{escape(group.title)}</title>" if group.title else ""
     opacity = f' opacity="{num(group.opacity)}"' if group.opacity != 1 else ""
     return f"<g{data}{attributes}{opacity}>{title}"

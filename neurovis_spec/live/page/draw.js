@@ -80,6 +80,8 @@ export class Drawing {
     );
     /** @type {Group[]} */
     this.back = [];
+    /** what stands for lines that are left out @type {Group[]} */
+    this.bundles = [];
     /** @type {Group[]} */
     this.front = [];
     /** @type {Line[]} */
@@ -123,7 +125,8 @@ export class Drawing {
     } else if (id === 'caption') {
       this.caption = shapes[0];
     } else {
-      (this.lines.length || this.discs.length ? this.front : this.back).push(group);
+      const { front, bundles, back } = this;
+      (this.discs.length ? front : this.lines.length ? bundles : back).push(group);
     }
   }
 
@@ -264,7 +267,14 @@ export class Drawing {
           for (const shape of shapes) this.shape(context, shape);
         }
       }),
-      between: beads.length ? this.picture(camera, [], (context) => draw(context, beads)) : null,
+      between:
+        beads.length || this.bundles.length
+          ? this.picture(camera, [], (context) => {
+              draw(context, beads);
+              context.globalAlpha = near.size ? RECEDING : 1;
+              for (const { shapes } of this.bundles) for (const shape of shapes) this.shape(context, shape);
+            })
+          : null,
       words: this.picture(camera, words),
       front: this.picture(camera, [], (context) => {
         draw(context, discs);

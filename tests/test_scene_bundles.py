@@ -1,0 +1,194 @@
+"""Bundles: what a picture leaves out of a pathway is drawn, counted and added up, and nothing else is."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import math
+import re
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+from scenes import file_of, film_of, scene_of
+from test_scene_thinned import ENTRY, network_of
+
+import neurovis_spec as nv
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.layout import Layout
+from neurovis_spec.live.view import view_of
+from neurovis_spec.scene import Arrowhead, Disc, Group, Scene, Spline, Text, shown
+from neurovis_spec.scene.renderers import renderer_for
+from neurovis_spec.scene.themes import channels
+
+#: Two layers of which the second learns and inhibits itself; 90 connections, of which 20 are drawn.
+LAYERS = """
+neurovis: 1
+name: layers
+time: {steps: 3}
+neurons: {A: {count: 6, bias: 1}, B: {count: 8}}
+connections:
+  A -> B: {pattern: all_to_all, weight: "normal(0.1, 1)", delay: 3}
+  B -> A: {pattern: {total: {count: 32}}, weight: 0.25, plasticity: {hebbian: {rate: 0.01}}}
+  B -> B: {pattern: {total: {count: 10}}, weight: -0.5}
+layout: {engine: grid}
+"""
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if a picture had room for few lines."""
+    for name, number in {"_ALL": 20, "_MOST_LINES": 20, "_LINES_EACH": 1}.items():
+        monkeypatch.setattr(shown, name, number)
+
+
+def drawn(network: CompiledNetwork, step: int = 0, **asked: object) -> Scene:
+    wanted = replace(network.network.render, **asked)  # type: ignore[arg-type]
+    return scene_of(network, network.run(step + 1).snapshot(step), settings=wanted)
+
+
+def bundles_of(scene: Scene) -> dict[str, Group]:
+    return {group.data["pathway"]: group for group in scene.groups if "pathway" in group.data}
+
+
+@pytest.fixture(scope="module")
+def layers() -> CompiledNetwork:
+    return nv.compile_text(LAYERS)
+
+
+def test_a_bundle_says_how_many_are_left_out_what_they_do_and_who_learns(layers: CompiledNetwork) -> None:
+    scene, ends = drawn(layers, 2), layers.network.connections
+    whole, group = layers.network, [one.name for one in layers.network.neurons.groups for _ in one.indices]
+    weights = layers.run(3).snapshot(2).weights
+    seen = {one.data["connection"] for one in scene.groups if "connection" in one.data}
+    gone = [index for index, name in enumerate(whole.connection_names) if name not in seen]
+    bundles = bundles_of(scene)
+    assert sorted(bundles) == ["A -> B", "B -> A", "B -> B"]
+    for name, bundle in bundles.items():
+        own = [i for i in gone if f"{group[ends.sources[i]]} -> {group[ends.targets[i]]}" == name]
+        total, data = weights[own].sum(), bundle.data
+        assert int(data["count"]) == len(own)
+        assert float(data["sum"]) == pytest.approx(total)
+        parts = {1: weights[own][weights[own] >= 0], -1: weights[own][weights[own] < 0]}
+        for end, word in ((1, "excite"), (-1, "inhibit")):
+            assert (word in data) == (len(parts[end]) > 0)
+            assert float(data.get(word, "0")) == pytest.approx(parts[end].sum())
+        assert bundle.title.startswith(f"{name.replace('->', '→')} · {len(own):,}\n")
+        assert ("learns" in data) == (name == "B -> A")
+    assert "Σ w = " in bundles["B -> A"].title
+    assert " at step 2\nhebbian(" in bundles["B -> A"].title
+    assert bundles["A -> B"].title.endswith("delay 3")
+    kinds = [[shape.kind for shape in b.shapes if isinstance(shape, Arrowhead)] for b in bundles.values()]
+    assert sorted(kinds) == [["arrow"], ["arrow", "bar"], ["bar"]]
+
+
+def test_a_band_is_as_wide_as_the_root_of_its_sum_and_wider_than_lines(layers: CompiledNetwork) -> None:
+    scene = drawn(layers)
+    widths, sums = list[float](), list[float]()
+    for bundle in bundles_of(scene).values():
+        widths += [shape.width for shape in bundle.shapes if isinstance(shape, Spline)]
+        sums += [abs(float(bundle.data[word])) for word in ("excite", "inhibit") if word in bundle.data]
+    assert np.allclose(np.array(widths) ** 2 / np.array(sums), widths[0] ** 2 / sums[0])
+    words = [
+        shape.text
+        for group in scene.groups
+        if group.id == "legend"
+        for shape in group.shapes
+        if isinstance(shape, Text)
+    ]
+    assert f"left out, added up: |Σ w| up to {max(sums):.3g}" in words
+    assert {"Bundle", "excite", "inhibit"} <= set(words)
+
+
+def test_bundles_lie_beneath_neurons_and_names_and_within_the_picture(layers: CompiledNetwork) -> None:
+    scene = drawn(layers)
+    places = {id_: place for place, id_ in enumerate(group.id for group in scene.groups)}
+    bands = [places[group.id] for group in bundles_of(scene).values()]
+    assert max(place for id_, place in places.items() if re.fullmatch(r"c\d+", id_)) < min(bands)
+    assert max(bands) < min(place for id_, place in places.items() if re.fullmatch(r"n\d+|title:.*|hubs", id_))
+    for bundle in bundles_of(scene).values():
+        for shape in bundle.shapes:
+            for x, y in shape.points if isinstance(shape, Spline | Arrowhead) else ():
+                assert 0 < x < scene.width
+                assert 0 < y < scene.height
+    (hubs,) = [group for group in scene.groups if group.id == "hubs"]
+    assert [shape.text for shape in hubs.shapes if isinstance(shape, Text)] == ["A ×6", "B ×8"]
+    assert Counter(group.data["group"] for group in scene.groups if "neuron" in group.data) == {"A": 6, "B": 8}
+
+
+def test_nothing_is_bundled_where_nothing_is_left_out_or_the_reader_left_it_out(layers: CompiledNetwork) -> None:
+    for asked in ({"full": True}, {"focus": ("A1", (0,))}, {"min_weight": 0.3}, {"path": ("A -> B", (0,), (10,))}):
+        scene = drawn(layers, **asked)
+        assert not bundles_of(scene)
+        assert "Bundle" not in str(scene.groups[-1])
+
+
+@given(
+    st.lists(st.integers(1, 9), min_size=4, max_size=4),
+    st.lists(ENTRY, min_size=1, max_size=6, unique_by=lambda entry: entry[:2]),
+    st.floats(0, 1),
+)
+@settings(max_examples=8, deadline=None)
+def test_no_pathway_is_missing_from_any_picture(
+    counts: list[int], entries: list[tuple[str, str, str, str]], room: float
+) -> None:
+    network = network_of(counts, entries)
+    ends, group = network.network.connections, [g.name for g in network.network.neurons.groups for _ in g.indices]
+    of = zip(ends.sources.tolist(), ends.targets.tolist(), strict=True)
+    there = Counter(f"{group[source]} -> {group[target]}" for source, target in of)
+    names = network.network.neurons.names
+    places = {name: (float(number % 6), float(number // 6)) for number, name in enumerate(names)}
+    settings_ = replace(network.network.render, most=int(room * len(ends)), labels=False)
+    scene = scene_of(network, network.run(1).snapshot(0), Layout("x", "manual", places, {}), settings_)
+    found = Counter({name: int(bundle.data["count"]) for name, bundle in bundles_of(scene).items()})
+    for one in scene.groups:
+        if "connection" in one.data:
+            found[" -> ".join(group[names.index(one.data[end])] for end in ("from", "to"))] += 1
+    assert found == there
+
+
+def test_single_neurons_are_their_own_hubs_and_glyphs_say_what_they_hold() -> None:
+    network = nv.compile_text(LAYERS + "render: {collapse: [B]}\n")
+    scene = drawn(network, most=0)
+    bundles = bundles_of(scene)
+    assert {name: int(one.data["count"]) for name, one in bundles.items()} == {"A -> B": 48, "B -> A": 32}
+    (disc,) = [s for g in scene.groups if g.data.get("neuron") == "B" for s in g.shapes if isinstance(s, Disc)]
+    heads = [shape.tip for shape in bundles["A -> B"].shapes if isinstance(shape, Arrowhead)]
+    assert all(math.dist(tip, disc.centre) < disc.radius + 12 for tip in heads)
+
+
+def test_both_of_a_symmetric_pair_are_counted_and_neither_way_is_missing() -> None:
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\nneurons: {A: {count: 3}, B: {count: 4}}\nlayout: {engine: grid}\n"
+        "connections: {A -> B: {pattern: all_to_all, weight: 1, symmetric: true}}\n"
+    )
+    bundles = bundles_of(drawn(network, most=2))
+    assert {name: int(one.data["count"]) for name, one in bundles.items()} == {"A -> B": 10, "B -> A": 10}
+
+
+def test_all_kinds_of_files_show_them(layers: CompiledNetwork) -> None:
+    recording = layers.run(3)
+    scene = drawn(layers)
+    svg = file_of(scene, ".svg").decode()
+    assert len(re.findall('<g class="bundle" data-pathway="[AB] -&gt; [AB]" data-count="[0-9]+" data-sum=', svg)) == 3
+    film = film_of(layers, [recording.snapshot(step) for step in range(3)])
+    moving = renderer_for(".svg", moving=True).animate(film, ".svg").decode()
+    (first, *_) = re.findall(r'<g class="bundle".*?</g>', moving, re.DOTALL)
+    assert first.count("<path") == first.count('class="fixed"') - first.count("<polygon") > 0
+    assert 'class="bundle' not in file_of(drawn(layers, full=True), ".svg").decode()
+    png = Image.open(io.BytesIO(file_of(scene, ".png"))).convert("RGB")
+    band = next(shape for shape in bundles_of(scene)["A -> B"].shapes if isinstance(shape, Spline))
+    assert png.getcolors(1 << 24) is not None
+    assert channels(band.stroke) in {colour for _, colour in png.getcolors(1 << 24) or ()}
+
+
+def test_the_live_page_gets_them(layers: CompiledNetwork) -> None:
+    content = json.loads(gzip.decompress(view_of(layers, layers.gains).content))
+    found = [group for group in content["groups"] if "pathway" in group["data"]]
+    assert sorted(group["id"] for group in found) == ["bundle:A -> B", "bundle:B -> A", "bundle:B -> B"]
+    assert all(group["title"].split("\n")[0].endswith(f" · {int(group['data']['count']):,}") for group in found)
