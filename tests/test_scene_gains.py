@@ -24,10 +24,11 @@ CASE = use_case_1(1300)
 def reaches(
     activity: list[float], weights: list[float], signals: list[float] | None = None, changes: list[float] | None = None
 ) -> Reached:
-    """What is reached, activities by steady ones."""
+    """What is reached, activities by steady ones of either sign."""
     peaks, heavy, none = np.array(activity), np.array(weights), np.zeros(len(weights))
     sent = heavy if signals is None else np.array(signals)
-    return Reached(0 * peaks, peaks, peaks, heavy, sent, none if changes is None else np.array(changes))
+    known = none if changes is None else np.array(changes)
+    return Reached(-peaks, peaks, peaks, heavy, sent, known, known[None, known > 0])
 
 
 def test_all_four_ingredients_of_use_case_1_show() -> None:

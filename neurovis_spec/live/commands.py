@@ -30,9 +30,9 @@ class Appearance:
 
     def gains(self, gains: Gains) -> Gains:
         """These gains, so many times as large."""
-        return Gains(
+        return replace(
+            gains,
             activity=gains.activity * self.activity,
-            centre=gains.centre,
             signal=gains.signal * self.signal,
             thickness=gains.thickness * self.thickness,
             change=gains.change * self.change,

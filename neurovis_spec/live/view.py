@@ -78,7 +78,7 @@ class View:
     drawn: Gathered
     gains: Gains
     plan: Plan
-    #: of each line, the largest weight that there is on its scale
+    #: of each line, the largest weight that there is on its scale, of compressed ones its square root
     largest: FloatArray
     layout: Layout
     #: all that stays, as a page gets it
@@ -120,7 +120,9 @@ class View:
     def _shares(self, weights: FloatArray) -> npt.NDArray[np.int64]:
         """How large weights are, as parts of the largest of their scale; none is 0 that is not."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            parts = np.nan_to_num(np.ceil(SHARES * np.abs(weights) / self.largest), nan=0.0, posinf=SHARES)
+            parts = np.nan_to_num(
+                np.ceil(SHARES * self.gains.thickened(weights) / self.largest), nan=0.0, posinf=SHARES
+            )
         result: npt.NDArray[np.int64] = np.minimum(parts, SHARES).astype(np.int64)
         return result
 
@@ -226,7 +228,7 @@ def view_of(
     planned = plan(drawn, stands, seen, settings)
     largest = np.ones(len(seen.thickness))
     for scale in seen.thickness_scales:
-        largest[seen.thickness == scale.gain] = scale.reaches or 1.0
+        largest[seen.on_thickness(scale)] = scale.shown(scale.reaches or 1.0)
     frame = planned.frame
     kinds = {"isBar": BAR, "isFaint": FAINT, "isNegative": NEGATIVE, "isClamped": CLAMPED, "isUndefined": UNDEFINED}
     # of a picture in which something is collapsed nothing can be put elsewhere

@@ -65,11 +65,11 @@ def looks(
 ) -> Looks:
     """What a step looks like, with lines of at most this width; ``signals`` are what is sent along each, and ``ends``
     how they end, by default what the network sends, and as its connections do."""
-    widths = encoding.line_width(snapshot.weights, gains.thickness, widest)
-    changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change)
+    widths = encoding.line_width(snapshot.weights, gains.thickness, widest, gains.thickness_compressed)
+    changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change, gains.least_change)
     seen = snapshot.activity if snapshot.seen is None else snapshot.seen
     sent, weight = Signals(network).at(snapshot) if signals is None else signals
-    lines = encoding.connection_colour(sent, weight, gains.signal)
+    lines = encoding.connection_colour(sent, weight, gains.signal, gains.signal_compressed)
     if snapshot.shown is not None:
         states = ShownStates(network)
         seen = states.put(seen, snapshot.shown[states.neurons])
@@ -238,11 +238,14 @@ def _gain_of(gain: float, centre: float) -> str:
 def _gains_of(network: Network, gains: Gains) -> list[str]:
     """The gains of each connection, in words; that of changes where its weight can change. Most are said of many."""
     learns = np.isin(np.arange(len(network.connections)), network.changing).tolist()
-    said: dict[tuple[float, float, float, bool], str] = {}
+    signals, widths = gains.signal.tolist(), gains.thickness.tolist()
+    roots = gains.signal_compressed.tolist(), gains.thickness_compressed.tolist()
+    said: dict[tuple[float, float, float, bool, bool, bool], str] = {}
     result = []
-    for key in zip(gains.signal.tolist(), gains.thickness.tolist(), gains.change.tolist(), learns, strict=True):
+    for key in zip(signals, widths, gains.change.tolist(), learns, *roots, strict=True):
         if key not in said:
-            told = [f"signal {texts.number(key[0])}", f"thickness {texts.number(key[1])}"]
+            of = [" of the square root" if compressed else "" for compressed in key[4:]]
+            told = [f"signal {texts.number(key[0])}{of[0]}", f"thickness {texts.number(key[1])}{of[1]}"]
             said[key] = "gain: " + ", ".join([*told, f"change {texts.number(key[2])}"] if key[3] else told)
         result.append(said[key])
     return result

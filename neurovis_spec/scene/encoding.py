@@ -1,7 +1,8 @@
 """Eqs. 2–5: what activities and weights look like, as pure functions of arrays.
 
-In: activities, weights, gains (one for all, or one for each). Out: colour values in −1…1, widths in user units. The
-paper prints Eq. 5 as |γ·w[t] − w[t−1]|, which would glow for ever when γ ≠ 1; the difference is meant.
+In: activities, weights, gains (one for all, or one for each), which connections are compressed: of these the square
+root of the signal or the weight counts. Out: colour values in −1…1, widths in user units. The paper prints Eq. 5 as
+|γ·w[t] − w[t−1]|, which would glow for ever when γ ≠ 1; the difference is meant.
 """
 
 from __future__ import annotations
@@ -10,10 +11,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import BoolArray, FloatArray
 
 #: One for all, or one for each.
 Gain: TypeAlias = float | FloatArray
+#: Of all, or of each.
+Compressed: TypeAlias = bool | BoolArray
 
 #: The thinnest line, in user units.
 THINNEST = 0.6
@@ -37,25 +40,34 @@ def neuron_colour(activity: FloatArray, gain: Gain, centre: Gain = 0.0) -> Float
     return result
 
 
-def connection_colour(sent: FloatArray, weight: FloatArray, gain: Gain) -> FloatArray:
+def connection_colour(sent: FloatArray, weight: FloatArray, gain: Gain, compressed: Compressed = False) -> FloatArray:
     """Eq. 3: CC_ij[t] = clip(−1, γ_CC · a_i[t] · w_ij[t], 1); ``sent`` is the activity of the source of each, or what
     it takes in its place (``Signals``). A signal that is no number is drawn as none."""
     with _quiet():
-        result: FloatArray = np.nan_to_num(np.clip(gain * sent * weight, -1.0, 1.0), nan=0.0)
+        shown = gain * sent * weight
+        if np.any(compressed):
+            shown = np.where(compressed, gain * root(sent * weight), shown)
+        result: FloatArray = np.nan_to_num(np.clip(shown, -1.0, 1.0), nan=0.0)
     return result
 
 
-def thickness(weight: FloatArray, gain: Gain) -> FloatArray:
+def thickness(weight: FloatArray, gain: Gain, compressed: Compressed = False) -> FloatArray:
     """Eq. 4: CT_ij[t] = |γ_CT · w_ij[t]|."""
     with _quiet():
-        result: FloatArray = np.abs(gain * weight)
+        result: FloatArray = np.abs(gain * np.where(compressed, root(weight), weight))
     return result
 
 
-def line_width(weight: FloatArray, gain: Gain, widest: float) -> FloatArray:
+def root(values: FloatArray) -> FloatArray:
+    """The square root of magnitudes, with their signs."""
+    result: FloatArray = np.copysign(np.sqrt(np.abs(values)), values)
+    return result
+
+
+def line_width(weight: FloatArray, gain: Gain, widest: float, compressed: Compressed = False) -> FloatArray:
     """The width of a line: Eq. 4, never thinner than ``THINNEST``, never wider than ``widest``, which covers the whole
     picture. Weights that are no finite number are drawn as thin as can be."""
-    drawn = np.clip(thickness(weight, gain), THINNEST, widest)
+    drawn = np.clip(thickness(weight, gain, compressed), THINNEST, widest)
     result: FloatArray = np.where(np.isfinite(weight), drawn, THINNEST)
     return result
 
@@ -66,12 +78,14 @@ def clamped(widths: FloatArray) -> FloatArray:
     return result
 
 
-def glow(weight: FloatArray, previous: FloatArray | None, gain: Gain) -> FloatArray:
-    """Eq. 5: LI_ij[t] = |γ_LI · (w_ij[t] − w_ij[t−1])|, none where there is no step before."""
+def glow(weight: FloatArray, previous: FloatArray | None, gain: Gain, least: Gain = 0.0) -> FloatArray:
+    """Eq. 5: LI_ij[t] = |γ_LI · (w_ij[t] − w_ij[t−1])|, none where there is no step before; and none of changes by
+    less than the ``least`` that are shown."""
     if previous is None:
         return np.zeros_like(weight)
     with _quiet():
-        result: FloatArray = np.abs(gain * (weight - previous))
+        change = weight - previous
+        result: FloatArray = np.where(np.abs(change) < least, 0.0, np.abs(gain * change))
     return result
 
 

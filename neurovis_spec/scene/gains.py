@@ -2,20 +2,23 @@
 
 In: what a run reaches. Out: Gains, one for every neuron and connection, and the scales that a legend shows. The neurons
 of a group, and the connections of an entry, have one gain; what is declared in a module has one in all its instances.
-Those whose ranges are alike share a scale.
+Those whose ranges are alike share a scale. Of an entry whose weights are too many, or too far apart, to be told by eye
+the square root is shown: it is compressed.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings, ShownState, StatedGain
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.scene import encoding
 from neurovis_spec.scene.called import Names, names_of, unit_of
 from neurovis_spec.scene.reached import Reached
 from neurovis_spec.scene.shown_states import ShownStates
@@ -31,6 +34,8 @@ _JUST, _SPREAD = 0.25, 32.0
 _MOST = 0.9
 #: ranges that differ by less than this factor are alike; there are at most so many scales
 _ALIKE, _SCALES = 2.0, 4
+#: of those that are one-sided, so that each uses nearly the whole of its colour
+_ALIKE_SPANS = 1.25
 #: weights are compared by eye: those that differ by less than this factor share a scale
 _ALIKE_WEIGHTS = 3.0
 #: how wide, in user units, the strongest line is to be, one that learns, and a typical one, in a small network; and how
@@ -38,6 +43,14 @@ _ALIKE_WEIGHTS = 3.0
 _WIDEST, _LEARNED, _TYPICAL, _SEEN = 5.0, 5.0, 2.2, 2.0
 #: with more lines than this they get thinner
 _CROWD = 10
+#: an entry of more connections than this is compressed, and one whose strongest are so many times a typical one
+_MANY, _FAR_APART = 500, 20.0
+#: the share of its members that those which are "the strongest" of a group or an entry are not less than
+_STRONGEST = 0.99
+#: how wide the strongest are at least of what is compressed, and how wide any is at most
+_STRONG, _BROADEST = 2.4, 6.0
+#: the share of changes that the largest are beyond, which alone glow where everything learns all the time
+_LARGEST = 0.9
 #: a state is at rest at 0 where the middle of its values is nearer to that than this share of its range
 _REST = 0.1
 #: what is at most so much is nothing but rounding, and beyond that numbers overflow
@@ -48,29 +61,61 @@ _LEAST, _GREATEST = 1e-12, 1e280
 class Scale:
     """A gain and what has it: the groups, entries or references in ``names`` (empty: all that have no other).
     ``reaches`` is how far their values go, as a distance from ``centre``; 0 where nothing is known of it. ``state`` is
-    what is shown in place of an activity."""
+    what is shown in place of an activity. Where it is ``compressed`` the gain is that of the square root; of changes,
+    those below ``least`` are not shown."""
 
     gain: float
     names: tuple[str, ...] = ()
     centre: float = 0.0
     reaches: float = 0.0
     state: str = ""
+    compressed: bool = False
+    least: float = 0.0
+
+    def shown(self, value: float) -> float:
+        """What of a magnitude the gain is multiplied with."""
+        return math.sqrt(value) if self.compressed else value
+
+    @property
+    def full(self) -> float:
+        """The magnitude at which a colour is full, or a line is a unit wide."""
+        return 1 / self.gain**2 if self.compressed else 1 / abs(self.gain)
 
 
 @dataclass(frozen=True, eq=False)
 class Gains:
     """γ_NC (``activity``, n) with what is drawn as 0 (``centre``, n), γ_CC (``signal``, m), γ_CT (``thickness``, m,
-    user units), γ_LI (``change``, m) of Eqs. 2–5, and the scales that they make, each sort in the order of the spec."""
+    user units), γ_LI (``change``, m) of Eqs. 2–5, and the scales that they make, each sort in the order of the spec.
+    Connections are compressed, or not, in their colour and in their thickness (m), and glow where they change by no
+    less than ``least_change`` (m)."""
 
     activity: FloatArray
     centre: FloatArray
     signal: FloatArray
     thickness: FloatArray
     change: FloatArray
+    signal_compressed: BoolArray
+    thickness_compressed: BoolArray
+    least_change: FloatArray
     activity_scales: tuple[Scale, ...]
     signal_scales: tuple[Scale, ...]
     thickness_scales: tuple[Scale, ...]
     change_scales: tuple[Scale, ...]
+
+    def thickened(self, weights: FloatArray) -> FloatArray:
+        """What of weights (m,) is shown as thickness: their magnitudes, or the square roots of these."""
+        sizes = np.abs(weights)
+        result: FloatArray = np.where(self.thickness_compressed, np.sqrt(sizes), sizes)
+        return result
+
+    def widths(self, weights: FloatArray) -> FloatArray:
+        """Eq. 4 of weights (m,)."""
+        return encoding.thickness(weights, self.thickness, self.thickness_compressed)
+
+    def on_thickness(self, scale: Scale) -> BoolArray:
+        """The connections (m,) that have a scale of thickness."""
+        result: BoolArray = (self.thickness == scale.gain) & (self.thickness_compressed == scale.compressed)
+        return result
 
     @property
     def brief(self) -> Gains:
@@ -103,15 +148,15 @@ def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Ga
     are finite and positive."""
     names = names_of(network)
     groups, entries = _groups(network, names), _entries(network, names)
-    range_ = 2 * np.minimum(run.activity / 2, run.typical)  # so that nothing overflows
-    colours = _shared([_full(range_[m]) for m in groups.members])
+    colours = _colours(groups, run)
     stated = [*_of_states(settings.show, run.shares, names), *_named(settings.activity, names)]
     activity = _chosen(groups, colours, stated, run.highest, run.lowest, ShownStates(network).called)
-    signals = _shared([_full(run.signals[m]) for m in entries.members], least=True)
+    compressed = _compressed(entries, run.weights)
+    signals = _signals(entries, run.signals, compressed)
     signal = _chosen(entries, signals, _of_lines(settings.signal, names, network), run.signals)
-    widths = _widths(entries, run.weights, network.changing)
+    widths = _widths(entries, run.weights, network.changing, compressed)
     thickness = _chosen(entries, widths, _of_lines(settings.thickness, names, network), run.weights)
-    changes = _shared([_middle(_known(run.changes[m])) for m in entries.members])
+    changes = _changes(entries, run, network.changing)
     change = _chosen(entries, changes, _of_lines(settings.change, names, network), run.changes)
     return Gains(
         activity=activity.gains,
@@ -119,6 +164,9 @@ def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Ga
         signal=signal.gains,
         thickness=thickness.gains,
         change=change.gains,
+        signal_compressed=signal.compressed,
+        thickness_compressed=thickness.compressed,
+        least_change=change.least,
         activity_scales=activity.scales,
         signal_scales=signal.scales,
         thickness_scales=thickness.scales,
@@ -140,6 +188,8 @@ class _Units:
 class _Chosen:
     gains: FloatArray
     centres: FloatArray
+    compressed: BoolArray
+    least: FloatArray
     scales: tuple[Scale, ...]
 
 
@@ -210,6 +260,8 @@ class _Share:
 
     units: list[int]
     gain: float
+    compressed: bool = False
+    least: float = 0.0
 
 
 def _chosen(
@@ -222,23 +274,21 @@ def _chosen(
 ) -> _Chosen:
     """Gains for all members: those that are chosen, under those that are stated. ``highest`` and ``lowest`` say how far
     the values of the members go, ``states`` which of them are states that are shown."""
-    gains, centres = np.ones(units.count), np.zeros(units.count)
     owner = np.full(units.count, -1, np.int64)  # the number of the scale that each member has
     scales: list[Scale] = []
     for share in chosen:
         for unit in share.units:
-            gains[units.members[unit]], owner[units.members[unit]] = share.gain, len(scales)
-        scales.append(Scale(share.gain, tuple(units.names[unit] for unit in share.units)))
-    if scales:
-        gains[owner < 0] = scales[0].gain
+            owner[units.members[unit]] = len(scales)
+        names = tuple(units.names[unit] for unit in share.units)
+        scales.append(Scale(share.gain, names, compressed=share.compressed, least=share.least))
+    others = scales[0] if scales else Scale(1.0)
     free = owner >= 0
     for one in stated:
         members = np.arange(units.count) if one.members is None else np.array(one.members, np.int64)
-        gains[members], centres[members], owner[members] = one.gain, one.centre, len(scales)
-        free[members] = False
+        owner[members], free[members] = len(scales), False
         scales.append(Scale(one.gain, (one.name,) if one.name else (), one.centre))
     left = {name for name, members in zip(units.names, units.members, strict=True) if free[members].any()}
-    kept: dict[tuple[float, float, str], Scale] = {}
+    kept: dict[Scale, Scale] = {}
     for number, scale in enumerate(scales):
         mine = np.flatnonzero(owner == number)
         if not len(mine):
@@ -252,21 +302,93 @@ def _chosen(
         state = _what({states[index] for index in mine.tolist()} if states else {""})
         if state and len(mine) == units.count:
             names = ()
-        same = kept.get((scale.gain, scale.centre, state))
+        key = replace(scale, names=(), state=state)
+        same = kept.get(key)
         if same is not None:
             names = () if not names or not same.names else (*same.names, *names)
             reaches = max(reaches, same.reaches)
-        kept[scale.gain, scale.centre, state] = replace(scale, names=names, reaches=reaches, state=state)
+        kept[key] = replace(scale, names=names, reaches=reaches, state=state)
     if not kept and units.count:
-        kept[1.0, 0.0, ""] = Scale(1.0)
+        kept[Scale(1.0)] = Scale(1.0)
     if len(kept) == 1 and not stated:  # it is that of all which have one
         kept = {key: replace(scale, names=()) for key, scale in kept.items()}
-    return _Chosen(gains, centres, tuple(kept.values()))
+    return _by_owner([*scales, others], owner, tuple(kept.values()))
+
+
+def _by_owner(scales: Sequence[Scale], owner: IntArray, shown: tuple[Scale, ...]) -> _Chosen:
+    """What the scales say of all members, by the number of the scale that each has: −1 is that of the last."""
+    return _Chosen(
+        gains=np.array([scale.gain for scale in scales])[owner],
+        centres=np.array([scale.centre for scale in scales])[owner],
+        compressed=np.array([scale.compressed for scale in scales])[owner],
+        least=np.array([scale.least for scale in scales])[owner],
+        scales=shown,
+    )
 
 
 def _what(states: set[str]) -> str:
     """What a scale is of, where it is not activities alone."""
     return "" if states == {""} else ", ".join(sorted(state or "activity" for state in states))
+
+
+def _compressed(entries: _Units, weights: FloatArray) -> list[bool]:
+    """Of which entries the square root is shown: those of many connections, and those whose strongest are far stronger
+    than a typical one. Of what is all alike nothing is gained by it."""
+    result = []
+    for members in entries.members:
+        known = _known(weights[members])
+        many = len(members) > _MANY
+        apart = len(known) > 0 and float(np.quantile(known, _STRONGEST)) >= _FAR_APART * _middle(known)
+        result.append((many or apart) and len(known) > 0 and bool(np.ptp(known) > 0))
+    return result
+
+
+def _colours(groups: _Units, run: Reached) -> list[_Share]:
+    """Gains of activities. Those of a group that is one-sided, as rates are, span all that it reaches, as half of a
+    theme's colours is all that it has. What the others have does not hang on that."""
+    range_ = 2 * np.minimum(run.activity / 2, run.typical)  # so that nothing overflows
+    spans = []
+    for members in groups.members:
+        one_sided = bool((run.lowest[members] >= 0).all() or (run.highest[members] <= 0).all())
+        spans.append(_strongest(run.activity[members]) if one_sided else 0.0)
+    shares = [
+        _Share(units, 1 / _nice(max(spans[unit] for unit in units))) for units in _alike(spans, _ALIKE_SPANS, _SCALES)
+    ]
+    for share in _shared([_full(range_[members]) for members in groups.members]):
+        others = [unit for unit in share.units if not spans[unit]]
+        shares += [replace(share, units=others)] if others else []
+    return sorted(shares, key=lambda share: share.units)
+
+
+def _signals(entries: _Units, signals: FloatArray, compressed: Sequence[bool]) -> list[_Share]:
+    """Gains of signals. What is compressed has its full colour at its strongest."""
+    reached = [signals[members] for members in entries.members]
+    exact = [0.0 if root else _full(own) for own, root in zip(reached, compressed, strict=True)]
+    strongest = [_strongest(own) if root else 0.0 for own, root in zip(reached, compressed, strict=True)]
+    roots = [
+        _Share(units, 1 / math.sqrt(_nice(max(strongest[unit] for unit in units))), compressed=True)
+        for units in _alike(strongest, _ALIKE**2, _SCALES)
+    ]
+    return sorted([*_shared(exact, least=True), *roots], key=lambda share: share.units)
+
+
+def _changes(entries: _Units, run: Reached, changing: IntArray) -> list[_Share]:
+    """Gains of changes. Where more glows than does not, only the largest changes are to glow, so that it is seen where
+    and when most is learned."""
+    shares = []
+    for share in _shared([_middle(_known(run.changes[members])) for members in entries.members]):
+        own = np.isin(changing, np.concatenate([entries.members[unit] for unit in share.units]))
+        steps = run.steps[:, own]
+        known = _known(steps)
+        always = 2 * np.count_nonzero(share.gain * known >= encoding.FAINTEST) > steps.size
+        shares.append(replace(share, least=float(np.quantile(known, _LARGEST)) if always else 0.0))
+    return shares
+
+
+def _strongest(values: FloatArray) -> float:
+    """The magnitude that hardly any of a group, or of an entry, is beyond; 0 where none reaches anything."""
+    known = _known(values)
+    return float(np.quantile(known, _STRONGEST, method="higher")) if len(known) else 0.0
 
 
 def _shared(full: Sequence[float], *, least: bool = False) -> list[_Share]:
@@ -279,10 +401,12 @@ def _shared(full: Sequence[float], *, least: bool = False) -> list[_Share]:
     return result
 
 
-def _widths(entries: _Units, weights: FloatArray, changing: IntArray) -> list[_Share]:
+def _widths(entries: _Units, weights: FloatArray, changing: IntArray, compressed: Sequence[bool]) -> list[_Share]:
     """Gains of thickness. Entries whose strongest weights are alike share one, so that these can be compared. One that
     learns has that of others if it is seen to grow there, else by what it reaches."""
-    peaks = [_known(weights[members]) for members in entries.members]
+    reached = [_known(weights[members]) for members in entries.members]
+    roots = [own if root else own[:0] for own, root in zip(reached, compressed, strict=True)]
+    peaks = [own[:0] if root else own for own, root in zip(reached, compressed, strict=True)]
     tops = [float(values.max(initial=0.0)) for values in peaks]
     learns = np.isin(np.arange(entries.count), changing)
     learning = {unit for unit, members in enumerate(entries.members) if learns[members].any()}
@@ -302,8 +426,20 @@ def _widths(entries: _Units, weights: FloatArray, changing: IntArray) -> list[_S
     own = [top if unit in learning else 0.0 for unit, top in enumerate(tops)]
     for units in _alike(own, _LEARNED / _SEEN, _SCALES - 1):
         shares.append(_Share(units, _LEARNED / max(own[unit] for unit in units) * _crowd(len(changing))))
-    nice = [_Share(sorted(share.units), 1 / _nice(1 / share.gain)) for share in shares]
+    shares += _root_widths(roots)
+    nice = [replace(share, units=sorted(share.units), gain=1 / _nice(1 / share.gain)) for share in shares]
     return sorted(nice, key=lambda share: share.units)
+
+
+def _root_widths(peaks: Sequence[FloatArray]) -> list[_Share]:
+    """The same of entries that are compressed: their strongest are wide, however many lines there are, and a typical
+    one is no thinner than a line can be, if no other gets too wide for it."""
+    shares = []
+    for units in _alike([float(own.max(initial=0.0)) for own in peaks], _ALIKE_WEIGHTS**2, _SCALES):
+        every = np.concatenate([peaks[unit] for unit in units])
+        least = max(_STRONG / math.sqrt(_strongest(every)), encoding.THINNEST / math.sqrt(_middle(every)))
+        shares.append(_Share(units, min(least, _BROADEST / math.sqrt(every.max())), compressed=True))
+    return shares
 
 
 def _alike(values: Sequence[float], factor: float, most: int) -> list[list[int]]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,8 @@ _TABLE_Y = 26.0
 _NAMES = 132.0
 #: what goes less than this beyond a scale is not worth a word
 _BEYOND = 1.05
+#: what is said of a scale that is compressed, and how much farther apart its weights in a legend are
+_ROOT, _FARTHER = "square root", 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +93,7 @@ def thickness(gains: Gains, theme: Theme) -> list[LegendEntry]:
         (scale, weights)
         for scale in gains.thickness_scales
         if scale.gain and scale.reaches and math.isfinite(_WIDEST / scale.gain)
-        for weights in [nice_weights(scale.gain, scale.reaches)]
+        for weights in [_root_weights(scale) if scale.compressed else nice_weights(scale.gain, scale.reaches)]
     ]
     if not shown:
         return []
@@ -107,7 +110,7 @@ def thickness(gains: Gains, theme: Theme) -> list[LegendEntry]:
             x = place * step
             shapes.append(stroke(x, _SHORT, theme.muted, _wide(scale, weight), y - 4))
             shapes.append(Text((x + _SHORT + _NEAR, y), texts.number(weight), SMALL, theme.muted))
-        words, x = named(scale), columns * step
+        words, x = with_root(named(scale), scale), columns * step
         shapes.append(Text((x, y), words, SMALL, theme.muted))
         across = max(across, x + texts.width(words, SMALL))
     return [LegendEntry(tuple(shapes), across, max(high(1), _TABLE_Y + _PITCH * (len(shown) - 1) + 3.0))]
@@ -115,7 +118,12 @@ def thickness(gains: Gains, theme: Theme) -> list[LegendEntry]:
 
 def _wide(scale: Scale, weight: float) -> float:
     """How wide a line of this weight is."""
-    return max(THINNEST, abs(scale.gain) * weight)
+    return max(THINNEST, abs(scale.gain) * scale.shown(weight))
+
+
+def with_root(words: str, scale: Scale) -> str:
+    """Words of a scale, which say so where it is compressed."""
+    return f"{words}, {_ROOT}" if scale.compressed else words
 
 
 def glow(gains: Gains, theme: Theme) -> list[LegendEntry]:
@@ -125,7 +133,10 @@ def glow(gains: Gains, theme: Theme) -> list[LegendEntry]:
         return []
     alone = len(gains.change_scales) == 1 and not shown[0].names
     told = [f"|Δw| {texts.number(1 / abs(scale.gain))} a step" for scale in shown]
-    lines = ["weight is changing", *(told if alone else map("{}: {}".format, told, map(named, shown)))]
+    most = [f"only the largest, from {texts.number(scale.least)}" if scale.least else "" for scale in shown]
+    if not alone:
+        told = [f"{named(scale)}: {words}" for scale, words in zip(shown, told, strict=True)]
+    lines = ["weight is changing", *(words for pair in zip(told, most, strict=True) for words in pair if words)]
     width = 3.0
     lit = float(glow_width(np.array(width), np.array(1.0)))
     across = max(texts.width(line, SMALL) for line in lines)
@@ -165,62 +176,94 @@ def nice_weights(gain: float, heaviest: float = math.inf) -> list[float]:
     return values[::-1]
 
 
+def _root_weights(scale: Scale) -> list[float]:
+    """The same of a scale that is compressed, farther apart.
+
+    >>> _root_weights(Scale(2.0, reaches=30.0, compressed=True))
+    [0.5, 2.0, 10.0]
+    """
+    values = [_nice_below(min(_WIDEST**2 * scale.full, scale.reaches))]
+    while len(values) < 3:
+        value = _nice_below(values[-1] * _FARTHER * (1 + 1e-9))
+        if abs(scale.gain) * scale.shown(value) * _BEYOND < THINNEST:
+            break
+        values.append(value)
+    return values[::-1]
+
+
 def _nice_below(value: float) -> float:
     exponent = math.floor(math.log10(value))
     factor = next((factor for factor in (5, 2) if factor * 10.0**exponent <= value * (1 + 1e-9)), 1)
     return float(f"{factor}e{exponent}")
 
 
-def _rows(words: str, scales: Sequence[Scale]) -> list[tuple[str, str, str]]:
-    """For each scale what is full on the left, what it is of, and what is full on the right."""
+class _Row(NamedTuple):
+    """A line under a ramp: what stands at its left end, in its middle, and at its right end; or, if it is ``within``,
+    halfway from the middle to the ends."""
+
+    low: str
+    middle: str
+    high: str
+    within: bool = False
+
+
+def _rows(words: str, scales: Sequence[Scale]) -> list[_Row]:
+    """For each scale what is full on the left, what it is of, and what is full on the right; of one that is compressed
+    also what has half of a colour."""
     rows = []
     for scale in scales:
-        low, high = _ends(scale)
         parts = (words, named(scale) if len(scales) > 1 or scale.names else "", _beyond(scale))
-        rows.append((low, " ".join(part for part in parts if part), high))
+        low, high = _around(scale, 1.0)
+        rows.append(_Row(low, " ".join(part for part in parts if part), high))
+        if scale.compressed:
+            low, high = _around(scale, 0.25)
+            rows.append(_Row(low, _ROOT, high, within=True))
     return rows
 
 
-def _ends(scale: Scale) -> tuple[str, str]:
-    """The values at which the colour is full; they change places where the gain is negative."""
+def _around(scale: Scale, share: float) -> tuple[str, str]:
+    """The values that are so far from the middle as a share of those at which the colour is full; they change places
+    where the gain is negative."""
     if not scale.gain:
         return "−∞", "+∞"
-    half = 1 / scale.gain
-    low, high = (texts.number(scale.centre + side * half, sign=True) for side in (-1, 1))
+    half = math.copysign(scale.full, scale.gain)
+    digits = 3 if share == 1 else 2
+    low, high = (texts.number(scale.centre + side * share * half, digits, sign=True) for side in (-1, 1))
     return low, high
 
 
 def _beyond(scale: Scale) -> str:
     """How far values go that a scale does not show."""
-    if scale.reaches * abs(scale.gain) <= _BEYOND:
+    if scale.shown(scale.reaches) * abs(scale.gain) <= _BEYOND:
         return ""
     return "(and beyond)" if scale.centre else f"(up to {texts.number(scale.reaches, 2)})"
 
 
-def _ramp(words: str, rows: Sequence[tuple[str, str, str]], theme: Theme) -> LegendEntry:
-    # the words stand in the middle, so the longer end counts twice
+def _ramp(words: str, rows: Sequence[_Row], theme: Theme) -> LegendEntry:
+    # the words stand in the middle, so the longer end counts twice, and one within stands on a mark of its own
     needed = [
-        texts.width(middle, SMALL) + 2 * max(texts.width(low, SMALL), texts.width(right, SMALL)) + 14
-        for low, middle, right in rows
+        (texts.width(middle, SMALL) + (1 + (not within)) * max(texts.width(low, SMALL), texts.width(right, SMALL)) + 14)
+        * (1 + within)
+        for low, middle, right, within in rows
     ]
     across = max(_RAMP, *needed) if needed else _RAMP
     stripes = colours(theme, np.linspace(-1, 1, _STRIPES))
     shapes: list[Shape] = [heading(words, theme), Ramp((0, SAMPLE_Y - 5), across, 10, tuple(stripes))]
-    for place, (low, middle, right) in enumerate(rows):
+    for place, (low, middle, right, within) in enumerate(rows):
         y = FIRST_Y + LINE * place
+        left, end = (0.25 * across, 0.75 * across) if within else (0.0, across)
         shapes += [
-            Text((0, y), low, SMALL, theme.muted),
+            Text((left, y), low, SMALL, theme.muted, "middle" if within else "start"),
             Text((across / 2, y), middle, SMALL, theme.muted, "middle"),
-            Text((across, y), right, SMALL, theme.muted, "end"),
+            Text((end, y), right, SMALL, theme.muted, "middle" if within else "end"),
         ]
     return LegendEntry(tuple(shapes), max(across, texts.width(words, HEADING, 600)), high(len(rows)))
 
 
 def _strokes(scale: Scale, weights: Sequence[float], theme: Theme) -> LegendEntry:
     shapes: list[Shape] = [heading("Thickness", theme)]
-    strokes, words = len(weights) * (_STROKE + _STROKE_GAP) - _STROKE_GAP, "line: weight |w|"
-    if scale.names:
-        words = f"|w| of {named(scale)}"
+    strokes = len(weights) * (_STROKE + _STROKE_GAP) - _STROKE_GAP
+    words = with_root(f"|w| of {named(scale)}" if scale.names else "line: weight |w|", scale)
     across = max(strokes, texts.width(words, SMALL))
     for place, value in enumerate(weights):
         x = (across - strokes) / 2 + place * (_STROKE + _STROKE_GAP)

@@ -138,7 +138,7 @@ def plan(
     weights = np.abs(drawn.network.connections.weights.whole()) if peaks is None else peaks
     content = _content(drawn, layout, settings, weights, begin)
     network, seen = content.network, content.seen
-    widths = encoding.clamped(encoding.thickness(weights, gains.thickness)[seen.lines])
+    widths = encoding.clamped(gains.widths(weights)[seen.lines])
     framed = _framed(_Wanted(content, gains, settings, theme, narrowest), widths)
     frame, gains = framed.frame, in_pages(gains, framed.unit)
     page = _on_page(content, framed, gains, layout, theme)
@@ -157,7 +157,7 @@ def plan(
         sizes=sizes,
         counts={line: count for line, count in enumerate(drawn.counts.tolist()) if drawn.sheaf[line]},
         lines=page.lines,
-        order=_order(network, encoding.thickness(network.connections.weights.whole(), gains.thickness), seen.lines),
+        order=_order(network, gains.widths(network.connections.weights.whole()), seen.lines),
         depth=() if content.near is None else tuple(np.argsort(content.near, kind="stable").tolist()),
         beads=delays.beads(network, page.lines, RADIUS * frame.scale, theme),
         lesions=content.lesions,
@@ -623,7 +623,8 @@ def _order(network: Network, widths: FloatArray, lines: npt.NDArray[np.bool_]) -
 
 def _reaches(network: Network, gains: Gains, widest: float) -> list[float]:
     """How far lines reach from their middle: half their width and a little air; those that learn glow as well."""
-    widths = encoding.line_width(network.connections.weights.whole(), gains.thickness, widest)
+    weights = network.connections.weights.whole()
+    widths = encoding.line_width(weights, gains.thickness, widest, gains.thickness_compressed)
     reaches = np.maximum(2.5, 0.5 * widths + 1.5)
     reaches[network.changing] = np.maximum(reaches[network.changing], 3.5)
     result: list[float] = reaches.tolist()

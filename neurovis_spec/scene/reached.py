@@ -18,6 +18,8 @@ from neurovis_spec.scene.signals import Signals
 
 #: Rows looked at together.
 _CHUNK = 256
+#: So many steps at most are looked at for how much changes at each, and so many numbers in all.
+_STEPS, _NUMBERS = 256, 4_000_000
 #: What is below this share of a neuron's largest activity counts as rest.
 REST = 1 / 200
 #: The shares of the values of a shown state that lie below the ends of its colours, and below rest, which is grey.
@@ -28,7 +30,8 @@ _SHARES = (0.02, 0.5, 0.98)
 class Reached:
     """Of n neurons the ``lowest`` and the ``highest`` a, and the geometric mean of |a| while they are not at rest
     (``typical``); of m connections the largest |w| (``weights``), |w·a| with what is sent in place of a (``signals``)
-    and |w[t] − w[t−1]| (``changes``). 0 where there is nothing."""
+    and |w[t] − w[t−1]| (``changes``). 0 where there is nothing. ``steps`` (k, p) has the last of these at each of some
+    steps, spread over the run, of the p connections that can change."""
 
     lowest: FloatArray
     highest: FloatArray
@@ -36,6 +39,7 @@ class Reached:
     weights: FloatArray
     signals: FloatArray
     changes: FloatArray
+    steps: FloatArray
     #: of what neurons show in place of their activity: what 2 %, 50 % and 98 % of its values lie below (3, n)
     shares: FloatArray | None = None
 
@@ -87,7 +91,7 @@ def nothing(network: Network) -> Reached:
     neurons, signals, changes = np.zeros(len(network.neurons)), *np.zeros((2, len(network.connections)))
     weights = _largest(network.connections.weights.whole()[None])
     weights[network.changing] = changes[network.changing] = np.inf
-    return Reached(neurons, neurons, neurons, weights, signals, changes)
+    return Reached(neurons, neurons, neurons, weights, signals, changes, np.zeros((0, len(network.changing))))
 
 
 def reached_by(
@@ -127,7 +131,18 @@ def reached_by(
     weight_peaks[changing], signal_peaks[changing], change_peaks[changing] = reach, signals, changes
     typical = np.where(awake > 0, np.exp(logs / np.maximum(awake, 1)), 0.0)
     signal_peaks = np.where(np.isfinite(signal_peaks), signal_peaks, 0.0)
-    return Reached(low, high, typical, weight_peaks, signal_peaks, change_peaks)
+    return Reached(low, high, typical, weight_peaks, signal_peaks, change_peaks, _spread(weights, follows))
+
+
+def _spread(weights: FloatArray, follows: npt.NDArray[np.bool_] | None) -> FloatArray:
+    """By how much weights (rows, p) change at some of the steps at which that is known, (k, p)."""
+    known = np.arange(len(weights) - 1) if follows is None else np.flatnonzero(follows)
+    most = min(_STEPS, max(_NUMBERS // max(weights.shape[1], 1), 1))
+    if len(known) > most:
+        known = known[np.linspace(0, len(known) - 1, most).astype(np.int64)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        result: FloatArray = np.abs(weights[known + 1] - weights[known])
+    return result
 
 
 def _chunks(rows: int) -> Iterator[slice]:

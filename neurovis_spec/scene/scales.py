@@ -13,7 +13,7 @@ import numpy as np
 
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.gains import Scale as Own
-from neurovis_spec.scene.legend_scales import named
+from neurovis_spec.scene.legend_scales import named, with_root
 from neurovis_spec.scene.model import Ramp, Shape, Text, Theme
 from neurovis_spec.scene.themes import colours
 
@@ -54,15 +54,19 @@ class ScaleLabel:
 
 def scale_of(name: str, used: Sequence[tuple[Own, float]]) -> ScaleLabel:
     """What full colours mean: of one scale its ends, of several how far each goes. ``used``: the scales, each with the
-    distance from its centre at which its colour is full."""
+    distance from its centre at which its colour is full; of one that is compressed this is said."""
     if not used:
         return ScaleLabel(name)
     if len(used) == 1:
         ((own, full),) = used
+        name = with_root(name, own)
         if not math.isfinite(full):
             return ScaleLabel(name, "−∞", "+∞")
         low, high = (texts.number(own.centre + side * full, 3, sign=True) for side in (-1, 1))
         return ScaleLabel(name, low, high)
-    parts = [f"{named(own)} ±{texts.number(full)}" + (f" around {texts.number(own.centre)}" if own.centre else "")
-             for own, full in used]  # fmt: skip
+    parts = [
+        f"{with_root(named(own), own)} ±{texts.number(full)}"
+        + (f" around {texts.number(own.centre)}" if own.centre else "")
+        for own, full in used
+    ]
     return ScaleLabel(f"{name} of {' · '.join(parts)}" if name else " · ".join(parts), "−", "+")

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.network import Network, StepLength
 from neurovis_spec.compiler.program import SPIKE
@@ -332,13 +332,14 @@ class Maker:
             connections, weights = connections[strong], weights[:, strong]
             if not len(connections):
                 return Note(f"every |w| is below {number(self.min_weight)}")
-        full, used = _full_at(weights, self.gains.thickness[connections], self.gains.thickness_scales)
+        full, compressed, used = _full_at(weights, self.gains, connections)
         every = np.stack([snapshot.weights for snapshot in snapshots])
         ends_at = [ends_of(network, one.weights) if one.ends is None else one.ends for one in snapshots]
         effects = effects_of(network, every, np.stack(ends_at))[:, connections]
         said = len(signed(network)) > 0
         with np.errstate(over="ignore", invalid="ignore"):
-            values = np.clip(effects / full, -1.0, 1.0)
+            shares = effects / full
+            values = np.clip(np.where(compressed, encoding.root(shares), shares), -1.0, 1.0)
         lows, highs = weights.min(axis=0), weights.max(axis=0)
         activity = np.stack([snapshots[0].activity, snapshots[0].activity])
         low, high = (ends.weights.whole().copy() for _ in range(2))
@@ -361,21 +362,22 @@ def _spikes(recording: Recording, neurons: IntArray) -> tuple[npt.NDArray[np.boo
 
 
 def _full_at(
-    weights: FloatArray, gains: FloatArray, scales: Sequence[Own]
-) -> tuple[FloatArray, list[tuple[Own, float]]]:
+    weights: FloatArray, gains: Gains, connections: IntArray
+) -> tuple[FloatArray, BoolArray, list[tuple[Own, float]]]:
     """The weight at which a cell has its full colour, for each connection and for each scale that some have: what all
-    but the strongest of a scale stay below. Connections share a scale here as they do in their thickness."""
+    but the strongest of a scale stay below; and which are compressed. Connections share a scale here as they do in
+    their thickness."""
     known = np.where(np.isfinite(weights), np.abs(weights), 0.0).max(axis=0)
-    full, used = np.ones(len(gains)), list[tuple[Own, float]]()
-    for scale in scales:
-        members = gains == scale.gain
+    full, used = np.ones(len(connections)), list[tuple[Own, float]]()
+    for scale in gains.thickness_scales:
+        members = gains.on_thickness(scale)[connections]
         own = known[members & (known > 0)]
         if not members.any():
             continue
         reached = float(f"{np.quantile(own, _MOST, method='higher'):.2g}") if len(own) else 1.0
         full[members] = reached
         used.append((scale, reached))
-    return full, used
+    return full, gains.thickness_compressed[connections], used
 
 
 def span_of(blocks: Sequence[Block], shots: Shots, width: float, dt: StepLength | None) -> Span:
