@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples
-from neurovis_layouts.layered.box_columns import Strips, straightened, tied, spined
+from neurovis_layouts.layered.box_columns import Strips, spined, straightened, tied
 from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.order import ordered
 from neurovis_layouts.layered.units import Unit

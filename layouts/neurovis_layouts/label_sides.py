@@ -43,11 +43,12 @@ def sided(problem: LayoutProblem, layout: Layout) -> Layout:
 def best_sides(problem: LayoutProblem, layout: Layout, freely: bool = False) -> dict[str, Side]:
     """The best sides of labels, by neuron. ``freely``, each label stands somewhere, though it may lie on something."""
     trial = _Trial(problem, layout)
+    names = {i: problem.neurons[i] for i in trial.beside}
     before = problem.memory.labels if problem.memory else {}
-    chosen = {i: before[name] for i in trial.beside if (name := problem.neurons[i]) in before}
-    classes = [mates for mates in _alike(problem, layout, trial.beside) if not any(i in chosen for i, _ in mates)]
-    given = {i: layout.labels[name] for i in trial.beside if (name := problem.neurons[i]) in layout.labels}
-    chosen = {**given, **chosen}
+    known = {i: before[name] for i, name in names.items() if name in before}
+    given = {i: layout.labels[name] for i, name in names.items() if name in layout.labels}
+    classes = [mates for mates in _alike(problem, layout, trial.beside) if not any(i in known for i, _ in mates)]
+    chosen = {**given, **known}
     beside = _beside(problem, layout, trial.beside)
     for _ in range(_ROUNDS):
         settled = dict(chosen)
@@ -55,8 +56,7 @@ def best_sides(problem: LayoutProblem, layout: Layout, freely: bool = False) -> 
             best: tuple[tuple[int, ...], dict[int, Side]] | None = None
             for rank, sides in enumerate(_candidates(mates, given, problem.direction)):
                 blocked, lines = trial.cost(sides, chosen)
-                apart = sum(chosen.get(k, side) != side for i, side in sides.items() for k in beside[i] - sides.keys())
-                cost = blocked, lines, apart, rank
+                cost = blocked, lines, _apart(sides, chosen, beside), rank
                 if (freely or not blocked) and (best is None or cost < best[0]):
                     best = cost, sides
             if best is not None:
@@ -64,7 +64,12 @@ def best_sides(problem: LayoutProblem, layout: Layout, freely: bool = False) -> 
         if chosen == settled:
             break
     kept = {i: side for i, side in chosen.items() if freely or i in given or not trial.cost({i: side}, chosen)[0]}
-    return {problem.neurons[i]: side for i, side in sorted(kept.items())}
+    return {names[i]: side for i, side in sorted(kept.items())}
+
+
+def _apart(sides: Mapping[int, Side], chosen: Mapping[int, Side], beside: Mapping[int, frozenset[int]]) -> int:
+    """How many labels of others of their groups stand on other sides."""
+    return sum(chosen.get(k, side) != side for i, side in sides.items() for k in beside[i] - sides.keys())
 
 
 def _alike(problem: LayoutProblem, layout: Layout, beside: Sequence[int]) -> list[list[tuple[int, Move]]]:

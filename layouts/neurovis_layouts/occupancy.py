@@ -292,23 +292,26 @@ class Occupancy:
                 return False
             if any(n not in self._members[number] and meet((*p, *p), wider) for n, p in points):
                 return False
-            near = (self._walls.near(padded(rect, rules.between)) | grown.keys()) - self._open - {number}
-            for other in near:
-                theirs = grown.get(other) or self._rects[other]
-                if (
-                    theirs is None
-                    or not meet(rect, theirs, rules.between)
-                    or not self._members[number].isdisjoint(self._members[other])
-                ):
-                    continue
-                # those that have been near each other may be; what lies on each other already does so no more than it
-                # did, or, where that cannot be helped, does
-                earlier = self._rects[other]
-                if before is None or earlier is None or not meet(before, earlier, rules.between):
-                    return False
-                shared = _shared(before, earlier)
-                if _shared(rect, theirs) > shared and (rules.between or not shared):
-                    return False
+            if not self._off_others(number, grown, rules):
+                return False
+        return True
+
+    def _off_others(self, number: int, grown: Mapping[int, Rect], rules: _Rules) -> bool:
+        """Whether a frame that is new or grows keeps off the others. Those that have been near each other may be; what
+        lies on each other already does so no more than it did, or, where that cannot be helped, does."""
+        rect, before = grown[number], self._rects[number]
+        for other in (self._walls.near(padded(rect, rules.between)) | grown.keys()) - self._open - {number}:
+            earlier = self._rects[other]
+            theirs = grown.get(other) or earlier
+            if theirs is None or not meet(rect, theirs, rules.between):
+                continue
+            if not self._members[number].isdisjoint(self._members[other]):
+                continue
+            if before is None or earlier is None or not meet(before, earlier, rules.between):
+                return False
+            shared = _shared(before, earlier)
+            if _shared(rect, theirs) > shared and (rules.between or not shared):
+                return False
         return True
 
     def _strangers(self, number: int, rect: Rect) -> set[int]:

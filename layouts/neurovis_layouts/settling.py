@@ -11,7 +11,9 @@ the same new neuron in all instances of one make, both of a mirrored pair.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
 from neurovis_layouts.alike import STAY, Alike, Axis, Move, pairs_by_axis, reflection, same, twice_axis
@@ -78,19 +80,10 @@ class _Settling:
 
     def places(self) -> Places:
         """Where everything stands."""
-        known = self._memory.known
-        best: tuple[int, float, Mapping[int, Point], Earlier, Occupancy] | None = None
-        for axis, held in self._axes():
-            before = self._memory.earlier(held, self._axes_at(axis))
-            there = self._occupancy({i: before.where[i] for i in sorted(held.keys() | before.newly)}, held, axis)
-            unfit = self._complete(there, before, held, axis)
-            if best is None or unfit < best[0]:
-                best = unfit, axis, held, before, there
-            if known or not unfit:
-                break
-        if best is None:  # nothing is known
+        known, begun = self._memory.known, self._begun()
+        if begun is None:  # nothing is known
             return Places(self._fresh)
-        _, axis, held, before, there = best
+        axis, held, before, there = begun
         if known:
             before = self._recalled(before, there, held)
             there = self._occupancy({i: before.where[i] for i in sorted(before.where.keys() - before.lost)}, held, axis)
@@ -109,6 +102,21 @@ class _Settling:
             about = tuple(self._problem.neurons[m] for m in later[lost[0]].bodies[0].members)
             raise LayoutRefusalError("pin-in-frame", "pins leave no room on a line", "move one of the pins", about)
         return Places([there.placed[i] for i in range(len(self._fresh))], axis, self._shift(held, axis))
+
+    def _begun(self) -> tuple[float, Mapping[int, Point], Earlier, Occupancy] | None:
+        """The axis at which most of what is held, and of what an earlier layout says, fits; what that is, and where it
+        stands."""
+        best: tuple[float, Mapping[int, Point], Earlier, Occupancy] | None = None
+        least = math.inf
+        for axis, held in self._axes():
+            before = self._memory.earlier(held, self._axes_at(axis))
+            there = self._occupancy({i: before.where[i] for i in sorted(held.keys() | before.newly)}, held, axis)
+            unfit = self._complete(there, before, held, axis)
+            if unfit < least:
+                least, best = unfit, (axis, held, before, there)
+            if self._memory.known or not unfit:
+                break
+        return best
 
     def _axes(self) -> Iterator[tuple[float, Mapping[int, Point]]]:
         """Where the axis may stand, the likeliest first, and where what is pinned and its images are then."""
@@ -294,8 +302,7 @@ class _Settling:
                 if not done.isdisjoint(one.members) or (known_before and not lost.issuperset(one.members)):
                     continue
                 counterparts = list(self._copies(alike, one, axis))
-                back = STAY
-                lead = next((copy for copy in counterparts if done.issuperset(copy[0])), None)
+                back, lead = STAY, next((copy for copy in counterparts if done.issuperset(copy[0])), None)
                 if known_before:
                     anchor: Point | None = before.where[one.members[0]]
                     shape = self._shape(one, before.where, self._frames.rects(before.where, {}), held)
@@ -306,17 +313,24 @@ class _Settling:
                     shape = _Shape.of(at, rect or bounds(at.values()))
                 else:
                     anchor, shape = None, self._shape(one, placed, there.rects, held)
-                copies = [Body(shape.offsets, one.frame, shape.rect, back)]
-                for mates, move in counterparts:
-                    if done.isdisjoint(mates) and all(set(mates).isdisjoint(copy.members) for copy in copies):
-                        offsets = tuple((i, offset) for i, (_, offset) in zip(mates, shape.offsets, strict=True))
-                        number = self._numbers.get(frozenset(mates), -1)
-                        copies.append(Body(offsets, number, shape.rect, back.then(move)))
+                copies = self._bodies(Body(shape.offsets, one.frame, shape.rect, back), counterparts, done)
                 done.update(i for copy in copies for i in copy.members)
-                yield tuple(copies), anchor
+                yield copies, anchor
             for neuron in range(len(problem.neurons)):
                 if neuron not in done and (neuron in lost or not known_before):
                     yield single(neuron)
+
+    def _bodies(
+        self, first: Body, counterparts: Sequence[tuple[tuple[int, ...], Move]], done: AbstractSet[int]
+    ) -> tuple[Body, ...]:
+        """A whole, and those of its counterparts of which nothing has its place."""
+        copies = [first]
+        for mates, move in counterparts:
+            if done.isdisjoint(mates) and all(set(mates).isdisjoint(copy.members) for copy in copies):
+                offsets = tuple((i, offset) for i, (_, offset) in zip(mates, first.offsets, strict=True))
+                number = self._numbers.get(frozenset(mates), -1)
+                copies.append(Body(offsets, number, first.rect, first.move.then(move)))
+        return tuple(copies)
 
     def _copies(self, alike: Alike, whole: Whole, axis: float) -> Iterator[tuple[tuple[int, ...], Move]]:
         """The counterparts of a whole within other instances of the make around it, or its mirror image; not all of its

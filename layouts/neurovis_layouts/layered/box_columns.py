@@ -87,12 +87,7 @@ def _part(levels: Levels, order: list[list[int]], box: int, sides: dict[tuple[in
     """
     spans = [r for r, rank in enumerate(order) if any(levels.nodes[n].box == box for n in rank)]
     part, first = _connected(levels, order, spans, box)
-    lean = dict.fromkeys(part.values(), 0)
-    for r in spans:
-        start = next(i for i, n in enumerate(order[r]) if levels.nodes[n].box == box)
-        for i, n in enumerate(order[r]):
-            if n in part:
-                lean[part[n]] += 1 if i > start else -1
+    lean = _leaning(levels, [order[r] for r in spans], box, part)
     of = {other: part[n] for other, n in first.items()}
     for other in sorted(of):
         settled = sides.get((box, other), 0)
@@ -106,6 +101,17 @@ def _part(levels: Levels, order: list[list[int]], box: int, sides: dict[tuple[in
     for r in spans:
         order[r].sort(key=lambda n: side[part[n]] if n in part else 0)
     return True
+
+
+def _leaning(levels: Levels, ranks: Sequence[Sequence[int]], box: int, part: Mapping[int, int]) -> dict[int, int]:
+    """For each connected part how many more of its nodes stand behind a column than before it."""
+    lean = dict.fromkeys(part.values(), 0)
+    for rank in ranks:
+        start = next(i for i, n in enumerate(rank) if levels.nodes[n].box == box)
+        for i, n in enumerate(rank):
+            if n in part:
+                lean[part[n]] += 1 if i > start else -1
+    return lean
 
 
 def _connected(

@@ -289,12 +289,7 @@ class Insertion:
         _, at, costs = options[choice]
         ties = np.flatnonzero(costs == costs.min())
         slot = int(ties[roll % len(ties)])
-        added: Added = {at: []}
-        for behind, n in enumerate(dict.fromkeys((node, self.image[node]))):
-            self.rank[n] = at
-            self._out.discard(n)
-            there = len(self.order[at]) - slot if behind else slot
-            added[at] += [(there, (behind, number), point) for number, point in enumerate(self._points[n])]
+        added = self._placed(node, at, slot)
         led: set[int] = set()
         for lines, step, idle in sides:
             for k, c in enumerate(lines[at][0] if lines else ()):
@@ -302,6 +297,16 @@ class Insertion:
                     self._lead(c, [slot, *self._way(lines, k, at, slot, step, idle)], at, step, added)
                     led.update((c, self._twin[c]))
         return self._insert(added, sorted(led))
+
+    def _placed(self, node: int, at: int, slot: int) -> Added:
+        """A node, and its image, in a rank again, at a slot, and at the one opposite."""
+        added: Added = {at: []}
+        for behind, n in enumerate(dict.fromkeys((node, self.image[node]))):
+            self.rank[n] = at
+            self._out.discard(n)
+            there = len(self.order[at]) - slot if behind else slot
+            added[at] += [(there, (behind, number), point) for number, point in enumerate(self._points[n])]
+        return added
 
     def _options(
         self, node: int, ups: Sequence[int], downs: Sequence[int], ways: Sequence[Lines]

@@ -188,10 +188,7 @@ def _with_hubs(problem: LayoutProblem, found: Sequence[Unit], lines: Mapping[int
     rings = [(unit, centre) for unit, centre in blocks if centre is not None]
     if not rings:
         return list(found)
-    near = _graph(problem, range(len(problem.neurons)))
-    single = {unit.members[0] for unit in found if len(unit.members) == 1 and unit.places is None}
-    mates = {m: near.succ[m].keys() & near.pred[m].keys() for unit, _ in rings for m in unit.members}
-    among = [sorted(single.intersection(*(mates[m] for m in unit.members))) for unit, _ in rings]
+    among = _among(problem, found, [unit for unit, _ in rings])
     times = Counter(m for some in among for m in some)
     hubs = [
         replace(unit, members=(*unit.members, some[0]), places=(*(unit.places or ()), centre))
@@ -200,6 +197,14 @@ def _with_hubs(problem: LayoutProblem, found: Sequence[Unit], lines: Mapping[int
     ]
     held = {member for unit in hubs for member in unit.members}
     return [*hubs, *(unit for unit in found if held.isdisjoint(unit.members))]
+
+
+def _among(problem: LayoutProblem, found: Sequence[Unit], rings: Sequence[Unit]) -> list[list[int]]:
+    """For each ring the single neurons that are connected both ways with all of it."""
+    single = {unit.members[0] for unit in found if len(unit.members) == 1 and unit.places is None}
+    near = _graph(problem, range(len(problem.neurons)))
+    mates = {m: near.succ[m].keys() & near.pred[m].keys() for unit in rings for m in unit.members}
+    return [sorted(single.intersection(*(mates[m] for m in unit.members))) for unit in rings]
 
 
 def _may_be_hub(problem: LayoutProblem, ring: Unit, hub: int) -> bool:
@@ -294,24 +299,27 @@ def _without_needless_loops(problem: LayoutProblem, found: list[Unit], lines: Ma
     makes, which is all that is in no loop of neurons and of rigid units."""
     owner = {member: i for i, unit in enumerate(found) for member in unit.members}
     # a rigid unit is drawn as one piece, as if it were a neuron
-    piece = {member: member for member in owner}
-    piece |= {member: -1 - i for i, unit in enumerate(found) if unit.places is not None for member in unit.members}
-    wired = [way for e in problem.edges if e.source in owner and e.target in owner for way in e.ways]
-    # units on one line are one, too
-    tied: nx.Graph[int] = nx.Graph()
-    tied.add_nodes_from(range(len(found)))
-    tied.add_edges_from((owner[line], owner[m]) for m, line in lines.items() if m in owner and line in owner)
-    first = {i: min(part) for part in nx.connected_components(tied) for i in part}
-    row = {member: first[i] for member, i in owner.items()}
+    piece = {m: m if found[i].places is None else -1 - i for m, i in owner.items()}
+    row = _rows(owner, lines)
+    wired = [way for e in problem.edges if {e.source, e.target} <= owner.keys() for way in e.ways]
     loop_of = _loops(piece.values(), ((piece[a], piece[b]) for a, b in wired))
-    along = [(a, b) for a, b in wired if loop_of[piece[a]] != loop_of[piece[b]] and row[a] != row[b]]
-    loops = _loops(row.values(), ((row[a], row[b]) for a, b in along))
+    along = [(row[a], row[b]) for a, b in wired if loop_of[piece[a]] != loop_of[piece[b]] and row[a] != row[b]]
+    loops = _loops(row.values(), along)
     size = Counter(loops.values())
     result: list[Unit] = []
-    for i, unit in enumerate(found):
-        whole = unit.places is not None or size[loops[first[i]]] == 1
+    for unit in found:
+        whole = unit.places is not None or size[loops[row[unit.members[0]]]] == 1
         result += [unit] if whole else [Unit((member,)) for member in unit.members]
     return result
+
+
+def _rows(owner: Mapping[int, int], lines: Mapping[int, int]) -> dict[int, int]:
+    """By neuron the first of the units that lines tie to its own, which is its ``owner``."""
+    tied: nx.Graph[int] = nx.Graph()
+    tied.add_nodes_from(owner.values())
+    tied.add_edges_from((owner[line], owner[m]) for m, line in lines.items() if m in owner and line in owner)
+    first = {i: min(part) for part in nx.connected_components(tied) for i in part}
+    return {m: first[i] for m, i in owner.items()}
 
 
 def _loops(nodes: Iterable[int], arcs: Iterable[tuple[int, int]]) -> dict[int, int]:

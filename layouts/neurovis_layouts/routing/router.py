@@ -78,6 +78,30 @@ def route_all(
     walls = Walls(around.frames, len(centres))
     near = Barriers(Obstacles(centres), walls)
     barriers = near if len(edges) <= careful else Barriers(Obstacles(()), walls)
+    routes = _tried(edges, centres, plan, barriers, around)
+    images = _led(plan.images, routes, edges, centres, barriers)
+    routes.update(images.kept(routes, edges, centres))
+    routes.update((i, route) for i, route in plan.there.items() if i in routes)
+    if len(edges) <= MOST_IMPROVED:
+        # of two images one is drawn, and what is firm may still be an arc between images
+        led = {image for i, image in images.of.items() if image != i}
+        free = set(routes) - plan.there.keys() - led - {i for i in plan.firm if images.of.get(i) != i}
+        if free:
+            routes.update(improved(Drawn(edges, centres, routes, around.frames, around.drawn, images), free))
+    looped = loops(edges, centres, routes, near, plan.there)
+    routes.update(looped)
+    routes.update(images.kept(looped, edges, centres))
+    return [routes[i] for i in range(len(edges))]
+
+
+def _tried(
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    plan: RoutePlan,
+    barriers: Barriers,
+    around: Surroundings,
+) -> dict[int, Route]:
+    """Routes by edge index but for loops: curves along the direction and bows, and ways round what these run over."""
     routes: dict[int, Route] = dict(plan.begun)
     if plan.waypoints is not None:
         chosen = plan.bowed | routes.keys()
@@ -89,17 +113,7 @@ def route_all(
     most = _MOST_AROUND if plan.waypoints is None else _MOST_AROUND_PLANNED
     detours = detoured(edges, centres, routes, barriers, ways, around.drawn, most)
     routes.update((i, way) for i, way in detours.items() if _inside(way, around.within))
-    images = _led(plan.images, routes, edges, centres, barriers)
-    routes.update(images.kept(routes, edges, centres))
-    routes.update((i, route) for i, route in plan.there.items() if i in routes)
-    free = set(routes) - plan.there.keys() - {image for i, image in images.of.items() if image != i}
-    free -= {i for i in plan.firm if images.of.get(i) != i}
-    if free and len(edges) <= MOST_IMPROVED:
-        routes.update(improved(Drawn(edges, centres, routes, around.frames, around.drawn, images), free))
-    looped = loops(edges, centres, routes, near, plan.there)
-    routes.update(looped)
-    routes.update(images.kept(looped, edges, centres))
-    return [routes[i] for i in range(len(edges))]
+    return routes
 
 
 def _inside(route: Route, within: Rect | None) -> bool:
