@@ -454,6 +454,7 @@ BROKEN: list[str | bytes] = [
     *(json.dumps({"type": "look", "items": ["n1"] * 65}), '{"type": "look", "items": ["n-1"]}'),
     *(json.dumps(DRAW | {"theme": "x"}), json.dumps(DRAW | {"signal": 0}), json.dumps(DRAW | {"change": 65})),
     *(json.dumps(DRAW | {"activity": True}), '{"type": "draw", "theme": ""}', json.dumps(DRAW | {"theme": None})),
+    json.dumps(DRAW | {"pathways": 1}),
     *('{"type": "set", "values": {"pull": 1}, "moving": 1}', '{"type": "lesion", "part": "B", "moving": true}'),
     *(
         json.dumps({"type": "trace", "items": ["n1"], "first": 0, "every": 1, "bins": 9} | wrong)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +16,16 @@ from hypothesis import strategies as st
 from test_scene_thinned import ENTRY, network_of
 
 import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.keywords import STILL, still_of
+from neurovis_spec.live.commands import Draw
+from neurovis_spec.live.protocol import command_of
+from neurovis_spec.live.show import Show
 from neurovis_spec.scene.collapse import gathered
 from neurovis_spec.scene.panels import ViewError
+from neurovis_spec.scene.probe import probe
 
 SPEC = """
 neurovis: 1
@@ -171,6 +179,30 @@ def test_what_its_author_has_placed_stays_there(tmp_path: Path) -> None:
     across, down = (np.subtract(where[name], where["E"]) for name in ("O", "I"))
     assert across[0] / down[1] == pytest.approx(6 / 4, abs=0.01)
     assert down[0] / down[1] == pytest.approx(-2 / 4, abs=0.01)
+
+
+def test_a_live_page_shows_them_when_it_is_asked_to() -> None:
+    compiled = nv.compile_text(SPEC)
+    asked = {"theme": "", "activity": 2, "signal": 1, "thickness": 1, "change": 1, "pathways": True}
+    command = command_of(json.dumps({"type": "draw", **asked}))
+    assert isinstance(command, Draw)
+    plain = Show().view(compiled)
+    view = plain.otherwise(command.appearance)
+    scene = json.loads(gzip.decompress(view.content))
+    assert scene["told"] == SENTENCES
+    assert [group["data"]["neuron"] for group in scene["groups"] if "neuron" in group["data"]] == ["E", "I", "O"]
+    assert view.gains.activity.tolist() == (2 * pathway_gains(compiled)).tolist()
+    members = view.members("n0")
+    assert members is not None
+    assert members.indices.tolist() == [0, 1, 2, 3]
+    back = view.otherwise(plain.appearance)
+    assert (back.content, json.loads(gzip.decompress(plain.content))["told"]) == (plain.content, [])
+
+
+def pathway_gains(compiled: Compilation) -> FloatArray:
+    """How much of each group's activity is full colour."""
+    network = compiled.network
+    return probe(replace(network, render=replace(network.render, pathways=True))).activity
 
 
 @given(

@@ -20,13 +20,15 @@ MOST = 64.0
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """The name of a theme ('': that of the spec), and how many times as large the gains of Eqs. 2–5 are."""
+    """The name of a theme ('': that of the spec), how many times as large the gains of Eqs. 2–5 are, and whether each
+    group is drawn as one glyph, with the pathways between them."""
 
     theme: str = ""
     activity: float = 1.0
     signal: float = 1.0
     thickness: float = 1.0
     change: float = 1.0
+    pathways: bool = False
 
     def gains(self, gains: Gains) -> Gains:
         """These gains, so many times as large."""

@@ -72,6 +72,7 @@ def content(
         "order": rows.neurons.tolist(),
         "ends": [network.connections.sources.tolist(), network.connections.targets.tolist()],
         "bands": [[band.start, band.name, band.count] for band in (rows.levels or ((),))[0]],
+        "told": list(scene.told),
         **declared,
         "constants": {
             "families": list(FAMILIES), "halo": HALO, "subscriptDrop": SUBSCRIPT_DROP, "subscriptSize": SUBSCRIPT_SIZE,

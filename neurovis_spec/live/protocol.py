@@ -315,8 +315,8 @@ def _factor(value: object) -> float:
     return number
 
 
-def _draw(theme: str, **gains: float) -> Draw:
-    return Draw(Appearance(theme, **gains))
+def _draw(theme: str, pathways: bool = False, **gains: float) -> Draw:
+    return Draw(Appearance(theme, **gains, pathways=pathways))
 
 
 def _values(value: object) -> Mapping[str, float]:
@@ -391,7 +391,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "event": ({"by": _whole(-1, 1)}, Event),
     "restart": ({}, Restart),
     "branch": ({}, Branch),
-    "draw": ({"theme": _theme, **dict.fromkeys(_GAINS, _factor)}, _draw),
+    "draw": ({"theme": _theme, **dict.fromkeys(_GAINS, _factor), "pathways": _truth}, _draw),
     "speed": ({"value": _speed}, Speed),
     "set": ({"values": _values, "moving": _truth}, Set),
     "feed": ({"name": _name, "values": _numbers, "moving": _truth}, Feed),
@@ -407,6 +407,6 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "fetch": ({"what": _one_of("svg", "film", "npz"), "seconds": _seconds}, Fetch),
 }
 #: Members that a message need not have.
-_OPTIONAL: Final = {"moving", "rasters"}
+_OPTIONAL: Final = {"moving", "pathways", "rasters"}
 #: The types of the messages that a client may send, for the tests of the documentation.
 MESSAGES: Final = tuple(_MESSAGES)

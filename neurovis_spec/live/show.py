@@ -5,7 +5,8 @@ In: a recording or the start of a run, a theme, an engine, a backend. Out: of a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from neurovis_spec.compilation import Compilation
@@ -63,4 +64,9 @@ class Show:
 
     def view(self, compiled: Compilation, appearance: Appearance = AS_IT_IS, layout: Layout | None = None) -> View:
         """How a network is drawn, by default in its own layout. Raises LayoutRefusalError."""
-        return view_of(compiled, compiled.gains_for(self.recording), self.theme, self.engine, appearance, layout)
+        shown = compiled
+        if appearance.pathways:
+            network = compiled.network
+            shown = replace(compiled, network=replace(network, render=replace(network.render, pathways=True)))
+        gains, otherwise = shown.gains_for(self.recording), partial(self.view, compiled, layout=layout)
+        return view_of(compiled, gains, self.theme, self.engine, appearance, layout, otherwise)

@@ -35,6 +35,7 @@ from neurovis_spec.scene.encode import looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gathered_layout import laid_out
 from neurovis_spec.scene.matrix import order_of
+from neurovis_spec.scene.pathway_words import told
 from neurovis_spec.scene.plan import Plan, plan
 from neurovis_spec.themes import THEMES
 
@@ -217,11 +218,13 @@ def view_of(
     engine: str | None = None,
     appearance: Appearance = AS_IT_IS,
     layout: Layout | None = None,
+    otherwise: Callable[[Appearance], View] | None = None,
 ) -> View:
-    """How a compiled network is drawn, by default in the layout of an engine. Raises LayoutRefusalError,
-    RendererError."""
+    """How a compiled network is drawn, by default in the layout of an engine. ``gains`` are of what its ``appearance``
+    shows, each neuron or each group; ``otherwise`` draws it in another one, by default with the same gains. Raises
+    LayoutRefusalError, RendererError."""
     network = compiled.network
-    settings = compiled.settings_for(appearance.theme or theme)
+    settings = replace(compiled.settings_for(appearance.theme or theme), pathways=appearance.pathways)
     drawn = gathered(network, settings.collapse, settings.pathways)
     seen = appearance.gains(gains)
     stands = laid_out(drawn, compiled.placed(engine) if layout is None else layout)
@@ -234,7 +237,7 @@ def view_of(
     # of a picture in which something is collapsed nothing can be put elsewhere
     where = {"scale": 0.0 if drawn.any else frame.scale, "left": frame.left, "top": frame.top}
     constants = {"levels": LEVELS, "fineness": FINENESS, "shares": SHARES, "share": _SHARE, **kinds, **where}
-    scene = _scene(planned, seen)
+    scene = _scene(drawn, planned, seen)
     rows = order_of(drawn.network, stands, range(len(drawn.network.neurons)))
     written = compiled.spec.render
     themed = theme is not None or (written is not None and written.theme is not None)
@@ -245,7 +248,7 @@ def view_of(
     begins = {"curves": [asdict(curve) for curve in curves.shown]}
     more = {**declared(compiled), **names, **begins, "themes": list(THEMES), "themed": themed}
     words = content(drawn.network, scene, rows, constants, more)
-    otherwise = partial(view_of, compiled, gains, theme, engine, layout=layout)
+    otherwise = otherwise or partial(view_of, compiled, gains, theme, engine, layout=layout)
     anew = partial(_planned, stands, seen, settings)
     return View(drawn, seen, planned, largest, stands, words, appearance, otherwise, quantities, listed, curves, anew)
 
@@ -257,7 +260,7 @@ def _planned(
     return drawn, plan(drawn, stands, gains, settings, narrowest=narrowest)
 
 
-def _scene(planned: Plan, gains: Gains) -> Scene:
+def _scene(drawn: Gathered, planned: Plan, gains: Gains) -> Scene:
     """All that stays: the picture before anything happens. No line glows, nothing is faint, and tooltips say no values:
     these come with each Glance."""
     network = planned.network
@@ -266,7 +269,8 @@ def _scene(planned: Plan, gains: Gains) -> Scene:
     of_neurons, of_connections = tooltips(network, gains, activity[None], weights[None])
     words = [_without_value(text) for text in of_neurons], [_without_value(text) for text in of_connections]
     scene = paint(planned, shown, np.zeros(len(shown.lines), bool), caption(network, 0, activity), words, 0)
-    return replace(scene, title=planned.title, groups=tuple(replace(group, opacity=1.0) for group in scene.groups))
+    groups = tuple(replace(group, opacity=1.0) for group in scene.groups)
+    return replace(scene, title=planned.title, groups=groups, told=told(drawn, weights, weights, shown.ends[None]))
 
 
 def _without_value(tooltip: str) -> str:

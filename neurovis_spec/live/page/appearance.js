@@ -1,5 +1,5 @@
 /**
- * Appearance: the theme, and how many times as large the gains are.
+ * Appearance: the theme, how many times as large the gains are, and whether groups are drawn as one glyph each.
  */
 
 import { Sliders } from './sliders.js';
@@ -18,21 +18,25 @@ const GAINS = {
 /** What is drawn otherwise than the spec says: in words, and what takes it back. @param {Gains} shown
  * @returns {{words: string, back: object}[]} */
 export function drawnOtherwise(shown) {
-  return Object.entries(shown)
-    .filter(([name, value]) => value !== (name === 'theme' ? '' : 1))
-    .map(([name, value]) => ({
-      words: name === 'theme' ? `theme ${value}` : `gain of ${name} × ${value}`,
-      back: { ...shown, [name]: name === 'theme' ? '' : 1 },
-    }));
+  const { theme, pathways, ...gains } = shown;
+  return [
+    ...(theme ? [{ words: `theme ${theme}`, back: { ...shown, theme: '' } }] : []),
+    ...(pathways ? [{ words: 'pathways', back: { ...shown, pathways: false } }] : []),
+    ...Object.entries(gains)
+      .filter(([, value]) => value !== 1)
+      .map(([name, value]) => ({ words: `gain of ${name} × ${value}`, back: { ...shown, [name]: 1 } })),
+  ];
 }
 
-/** A choice of themes, and a slider for each gain. */
+/** A choice of themes, a slider for each gain, and a button for pathways. */
 export class Appearance {
-  /** @param {Link} link @param {HTMLSelectElement} theme @param {HTMLElement} place */
-  constructor(link, theme, place) {
+  /** @param {Link} link @param {HTMLSelectElement} theme @param {HTMLElement} place @param {HTMLButtonElement} pathways */
+  constructor(link, theme, place, pathways) {
     this.theme = theme;
+    this.pathways = pathways;
+    pathways.onclick = () => this.toggle();
     /** @type {Gains} */
-    this.shown = { theme: '', activity: 1, signal: 1, thickness: 1, change: 1 };
+    this.shown = { theme: '', activity: 1, signal: 1, thickness: 1, change: 1, pathways: false };
     /** whether the system says if it is to be dark: nobody else does */
     this.isFree = false;
     /** whether it is dark because this page has asked for it */
@@ -77,8 +81,15 @@ export class Appearance {
     this.shown = shown;
     this.owner = owner;
     this.follow();
-    const { theme, ...gains } = shown;
+    const { theme, pathways, ...gains } = shown;
     this.theme.value = theme;
+    this.pathways.setAttribute('aria-pressed', String(pathways));
+    this.pathways.disabled = !owner;
     this.sliders.show(gains);
+  }
+
+  /** Draw each group as one glyph, or each neuron again. */
+  toggle() {
+    if (this.owner) this.ask({ pathways: !this.shown.pathways });
   }
 }

@@ -199,6 +199,7 @@ function choose(asMatrix) {
   if (changed) camera.fit();
   attention.spot = cells && ((id) => cells.at(id));
   canvas.setAttribute('aria-label', cells ? `${scene.title}, the matrix of its weights` : scene.title);
+  canvas.setAttribute('aria-description', scene.told.join('. '));
   part('matrix').setAttribute('aria-pressed', String(asMatrix));
   redraw();
 }
@@ -295,6 +296,7 @@ Object.assign(controls.keys, {
   t: ['open or close the panel for turning', () => turning.toggle()],
   y: ['open or close the panel of the body', () => body.toggle()],
   m: ['the matrix of the weights in place of the picture, and back', () => choose(!matrix)],
+  g: ['each group as one glyph, with the pathways between them, and back', () => turning.appearance.toggle()],
   p: ['pin the strip of what is held, or unpin it', () => strips.toggle()],
   '<': ['show more of the past', () => scrubber.more(1)],
   '>': ['show less of the past', () => scrubber.more(-1)],

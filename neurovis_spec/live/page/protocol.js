@@ -10,7 +10,7 @@ import { isStill } from './camera.js';
  *   onDisc: boolean, upward: boolean, columns: number, rows: number, pixels: string}} Shape */
 /** @typedef {{id: string, data: Object<string, string>, title: string, shapes: Shape[]}} Group */
 /** @typedef {Object<string, string>} Theme */
-/** @typedef {{theme: string, activity: number, signal: number, thickness: number, change: number}} Gains */
+/** @typedef {{theme: string, activity: number, signal: number, thickness: number, change: number, pathways: boolean}} Gains */
 /** @typedef {{name: string, value: number, low: number | null, high: number | null, description: string}} Declared */
 /** A turn: of which members it has, `type` decides.
  * @typedef {{step: number, type: string, name: string, neurons: string, part: string, connections: string, on: boolean,
@@ -23,7 +23,7 @@ import { isStill } from './camera.js';
  *   theme: Theme, dt: number | null, discs: number, lines: number, parameters: Declared[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
  *   themed: boolean, named: string[][], names: number[], curves: Curve[], order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
- *   groups: Group[]}} Scene */
+ *   told: string[], groups: Group[]}} Scene */
 /** Signals in one axis, by what they are asked for, the first in front, and their names.
  * @typedef {{items: string[], names: string[]}} Curve */
 /** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */

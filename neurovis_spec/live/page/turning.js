@@ -47,7 +47,12 @@ export class Turning {
     this.sliders = new Sliders(find('sliders'));
     this.feeds = new Feeds(link, find('feeds'));
     this.rules = new Rules(link, find('rules'));
-    this.appearance = new Appearance(link, /** @type {HTMLSelectElement} */ (find('theme')), find('gains'));
+    this.appearance = new Appearance(
+      link,
+      /** @type {HTMLSelectElement} */ (find('theme')),
+      find('gains'),
+      /** @type {HTMLButtonElement} */ (find('pathways')),
+    );
     this.shown = '';
     /** @type {Declared[]} */
     this.declared = [];
