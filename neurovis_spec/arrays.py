@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import groupby
-from typing import Any, Generic, TypeAlias, TypeVar, cast, overload
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar, cast, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -227,6 +227,42 @@ def integers(*parts: Indices) -> IntColumn:
 def reals(*parts: FloatArray) -> FloatColumn:
     """A column of these parts, one behind the other."""
     return Column.of(parts, np.float64)
+
+
+class Texts(NamedTuple):
+    """A text for each of many, or none: ``known[number]`` of each of the ``numbers``, none of −1."""
+
+    known: tuple[str, ...]
+    numbers: Indices
+
+    def of(self, place: int) -> str:
+        """The text of one, "" where it has none."""
+        number = int(self.numbers[place])
+        return "" if number < 0 else self.known[number]
+
+    def at(self, places: IntArray) -> Texts:
+        """Those of some, in this order."""
+        return self._replace(numbers=self.numbers[places])
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """The texts that are there, in no order that means anything."""
+        return tuple(self.known[number] for number in np.unique(self.numbers).tolist() if number >= 0)
+
+
+def texts_of(parts: Iterable[tuple[Texts | None, int]]) -> Texts | None:
+    """The texts of all parts, one behind the other, of which each has so many, or none; None where none has any."""
+    number_of: dict[str, int] = {}
+    found: list[Indices] = []
+    given = False
+    for texts, count in parts:
+        if texts is None:
+            found.append(np.full(count, -1, dtype=np.int8))
+            continue
+        given = True
+        moved = [number_of.setdefault(text, len(number_of)) for text in texts.known]
+        found.append(np.array([*moved, -1], dtype=np.int64)[texts.numbers])
+    return Texts(tuple(number_of), frozen(narrow(np.concatenate(found)))) if given else None
 
 
 def _alike(part: npt.NDArray[Any]) -> bytes:

@@ -20,6 +20,7 @@ from pydantic import TypeAdapter
 
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.connections.edges import EdgeColumns
+from neurovis_spec.compiler.drawing.sections import line_style
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.edge_list import EdgeTable
 from neurovis_spec.language.data.files import NamedFile, read_edges, read_sheet, read_table
@@ -32,10 +33,11 @@ from neurovis_spec.language.tables import (
     EdgeFile,
     EdgesField,
     as_where,
+    columns_in,
     columns_of_edges,
     edge_column,
 )
-from neurovis_spec.language.unknown import UNKNOWN, Unknown
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, one_or_more
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
@@ -47,7 +49,7 @@ Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | 
 def whole_text(spec: Spec, request: Request, sources: Mapping[str, str]) -> str:
     """The spec as one text. Raises SpecError where a file that it names is gone meanwhile."""
     findings = Findings()
-    reader = _Reader(request.root, findings)
+    reader = _Reader(request.root, findings, line_style(spec.render))
     root = reader.mapping(spec.source, request.base, ())
     included = () if request.includes is None else request.includes.files
     own = sources.get(spec.source.span.file)
@@ -80,9 +82,13 @@ def _set(root: dict[str, Plain], request: Request) -> None:
 class _Reader:
     """Makes plain values of nodes, with the data of files in their places."""
 
-    def __init__(self, root: Path, findings: Findings) -> None:
+    def __init__(self, root: Path, findings: Findings, style: Located[str] | None) -> None:
+        """``style``: the column of edges whose values pictures tell apart."""
         self._root, self._findings = root, findings
+        self._perhaps = () if style is None else (style,)
         self.inlined = False
+        #: the columns of texts that a connection names
+        self._texts: tuple[Located[str], ...] = ()
         #: columns of edges that settings may name, at a connection that has some
         self._columns: EdgeColumns | None = None
 
@@ -92,6 +98,9 @@ class _Reader:
             rest = {e.name: self.value(e.value, folder, path) for e in node.entries if e.name not in ("file", "key")}
             return {**rest, "values": self._table(node, folder)}
         around, self._columns = self._columns, self._columns_of(node, folder) or self._columns
+        if node.get("edges") is not None:
+            label = node.get("label")
+            self._texts = columns_in((label,)) if label is not None else ()
         result: dict[str, Plain] = {}
         for entry in node.entries:
             if (path == ("layout",) and entry.name == "file") or (not path and entry.name == "body"):
@@ -110,7 +119,7 @@ class _Reader:
                 return self._table(node, folder)
             if path and path[-1] == "edges" and node.get("file") is not None:
                 return self._edges(node, folder)
-            if self._columns is not None and node.get("column") is not None:
+            if self._columns is not None and node.get("column") is not None and path[-1] != "label":
                 column = edge_column(node, self._findings)
                 values = UNKNOWN if column is UNKNOWN else self._columns.value(column, self._findings)
                 return None if values is UNKNOWN else [*map(float, values)]
@@ -150,29 +159,66 @@ class _Reader:
         return {"csv": text.getvalue(), **rest}
 
     def _edges(self, node: SourceMapping, folder: Path) -> Plain:
-        edges = self._read_edges(node, folder)
-        return None if edges is UNKNOWN else list(_rows(edges))
+        written = self._written(node)._replace(texts=self._texts, perhaps=self._perhaps)
+        edges = read_edges(self._named(node, folder), self._findings, written=written)
+        if edges is UNKNOWN:
+            return None
+        return _with_texts(edges) if edges.texts else list(_rows(edges))
 
-    def _read_edges(self, node: Node, folder: Path, more: tuple[Located[str], ...] = ()) -> EdgeTable | Unknown:
+    def _written(self, node: SourceMapping) -> EdgeFile:
         written: object = _EDGES.validate_python(node, context=self._findings)
         assert isinstance(written, EdgeFile)
-        assert isinstance(node, SourceMapping)
-        return read_edges(self._named(node, folder), self._findings, written=written._replace(more=more))
+        return written
 
     def _columns_of(self, body: SourceMapping, folder: Path) -> EdgeColumns | None:
         """The columns of its edges that settings of a connection name; None where there are none."""
         edges = body.get("edges")
-        if not isinstance(edges, SourceMapping):
+        if not isinstance(edges, SourceMapping) or edges.get("file") is None:
             return None
         choices = [one for key in ("synapse", "plasticity") if (node := body.get(key)) for one in one_or_more(node)]
         settings = [entry.value for one in choices if isinstance(one, SourceMapping) for entry in one.entries]
         more = [name for one in settings if isinstance(one, SourceMapping) for name in columns_of_edges(one)]
-        table = self._read_edges(edges, folder, tuple({name.value: name for name in more}.values()))
+        if not more:
+            return None
+        written = self._written(edges)._replace(more=tuple({name.value: name for name in more}.values()))
+        table = read_edges(self._named(edges, folder), self._findings, written=written)
         return None if table is UNKNOWN else EdgeColumns.of(table)
 
 
 def _has_columns(node: SourceMapping) -> bool:
     return node.get("column") is not None or node.get("columns") is not None
+
+
+def _with_texts(edges: EdgeTable) -> Plain:
+    """Edges as a table within a spec, with their further columns of texts."""
+    count = range(len(edges))
+    table: dict[str, list[object]] = {name: [texts.of(edge) for edge in count] for name, texts in edges.texts.items()}
+    called: dict[str, Plain] = {}
+    for what, cells in _cells(edges).items():
+        name, place = what, edges.columns.get(what)
+        own = place is not None and edges.header[place - 1] == what
+        while not own and name.casefold() in map(str.casefold, table):
+            name += "'"
+        called[what] = name
+        table[name] = cells
+    seconds = called.pop("delay_seconds", None)
+    if seconds is not None and called.pop("delay", None) is None:  # else both are called as we call them
+        called["delay"] = {"column": seconds, "unit": "s"}
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows([[*table], *zip(*table.values(), strict=True)])
+    return {"csv": text.getvalue(), "columns": called}
+
+
+def _cells(edges: EdgeTable) -> dict[str, list[object]]:
+    """What a table has of edges, by what each column is for; an empty cell where nothing is said."""
+    found: dict[str, list[object]] = {"from": [*edges.sources], "to": [*edges.targets]}
+    found["weight"] = [*edges.weights.tolist()]
+    steps = edges.delays.tolist()
+    if max(steps, default=-1) >= 0:
+        found["delay"] = ["" if delay < 0 else delay for delay in steps]
+    if edges.seconds is not None:
+        found["delay_seconds"] = ["" if math.isnan(time) else time for time in edges.seconds.tolist()]
+    return found
 
 
 def _rows(edges: EdgeTable) -> Iterable[Plain]:

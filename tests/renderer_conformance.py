@@ -21,6 +21,7 @@ from neurovis_spec.scene import (
     Arrowhead,
     Disc,
     Film,
+    FlatSpline,
     Group,
     Image,
     Polyline,
@@ -46,9 +47,9 @@ def _scene(shapes: Sequence[Shape], theme: str = "default", density: float = 2.0
     return Scene(200, 140, THEMES[theme], "shapes", (Group(tuple(shapes), **more),), density)  # type: ignore[arg-type]
 
 
-def _fan(width: float) -> list[Shape]:
+def _fan(width: float) -> list[Spline]:
     """Straight lines in all directions, and a wave."""
-    result: list[Shape] = []
+    result: list[Spline] = []
     for number in range(12):
         x, y = math.cos(number * math.pi / 12), math.sin(number * math.pi / 12)
         points = tuple((70 + t * x, 70 + t * y) for t in (-60, -20, 20, 60))
@@ -114,6 +115,7 @@ SCENES = {
     "thin lines": _scene(_fan(0.6)),
     "lines": _scene(_fan(1.7)),
     "wide lines": _scene(_fan(7.0)[:3] + _fan(7.0)[-1:]),
+    "dashes": _scene([FlatSpline(line.points, line.stroke, 2.5, (9.0, 3.0, 2.5, 3.0)) for line in _fan(2.5)]),
     "heads": _scene(_heads()),
     "texts": _scene(_texts()),
     "areas": _scene(_areas()),

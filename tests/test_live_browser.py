@@ -126,8 +126,27 @@ connections:
 """
 
 
-def test_the_page_shows_how_synapses_and_symmetric_pairs_end(tmp_path: Path) -> None:
-    (tmp_path / "joined.yaml").write_text(JOINED)
+STYLED = """neurovis: 1
+name: styled
+neurons: {N: {count: 4, bias: 0.1}}
+connections:
+  N -> N:
+    edges:
+      csv: |
+        from,to,weight,kind
+        N1,N2,2,a
+        N2,N3,-3,b
+        N3,N4,1,c
+        N4,N1,2,d
+        N1,N3,2,b
+      columns: {from: from}
+render: {lines: {style: {column: kind}}}
+"""
+
+
+@pytest.mark.parametrize("text", [JOINED, STYLED], ids=["ends", "styles"])
+def test_the_page_shows_how_lines_end_and_their_styles(text: str, tmp_path: Path) -> None:
+    (tmp_path / "joined.yaml").write_text(text)
 
     async def main() -> None:
         async with shown(str(tmp_path / "joined.yaml"), tmp_path) as (opened, compiled, _):

@@ -33,7 +33,14 @@ SHAPE = {
 #: Where a schema cannot tell, or need not: whether a list of n values or a name is wanted depends on a definition.
 BEYOND = ("goal", "probability", "random", "weight", "swish", "slow", "own", "edges", "position")
 #: Defective specs with a shape that only who knows the rest of the spec, or YAML 1.2, can tell from a right one.
-ELSEWHERE = ("wrong_type_bool", "no_value", "centre_useless", "empty_reference")
+ELSEWHERE = (
+    "wrong_type_bool",
+    "no_value",
+    "centre_useless",
+    "empty_reference",
+    "line_style_no_entry",
+    "line_style_no_file",
+)
 
 
 def messages(text: str) -> list[str]:

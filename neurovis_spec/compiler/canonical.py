@@ -46,7 +46,7 @@ SCHEMA: Mapping[type, Content] = {
     Connections: content(
         "Connections",
         "sources targets weights centres delays rules entry low high entries",
-        "descriptions learns labels routes undelayed synapses twins lags tied",
+        "descriptions learns labels routes undelayed synapses twins lags tied own_labels styles",
     ),
     Input: content("Input", "name start size expression table", "slots parts hold indexed spikes widths"),
     Output: content("Output", "name neurons scalar", "states"),

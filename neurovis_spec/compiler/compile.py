@@ -19,7 +19,7 @@ from neurovis_spec.compiler.checks.warnings import warn
 from neurovis_spec.compiler.connections.connect import Connected, connect, join, tying
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
-from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
+from neurovis_spec.compiler.drawing.sections import check_style, layout_settings, line_style, render_settings
 from neurovis_spec.compiler.events.bound import found_in, make_settable, own_weights
 from neurovis_spec.compiler.flows import BY_SLOPE, plain_flow, sent_by
 from neurovis_spec.compiler.levels import Cycle, Order, held_at, order_of
@@ -131,7 +131,8 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
     constants, census = declared.constants, declared.census
     scopes, inputs = declared.expansion.scopes, declared.expansion.inputs
     layout = layout_settings(spec.layout, scopes, census, findings)
-    connected = connect(scopes, census, request.limits, declared.seed)
+    style = line_style(spec.render)
+    connected = connect(scopes, census, request.limits, declared.seed, style)
     files, used = [file.model for file in request.includes.files], integrated(census.groups, connected.bundles)
     check_dt(spec, files, used, [scope.section for scope in scopes], findings)
     if declared.integration.method in BY_SLOPE:
@@ -139,6 +140,8 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
         check_slopes_through(spec, files, census, connected.bundles, findings)
     finder = finder_of(census, connected, findings)
     render = render_settings(spec.render, finder, constants)
+    if style is not None:
+        check_style(style, connected, findings)
     outputs = make_outputs(spec, finder)
     if spec.render is not None and spec.render.figure:
         from neurovis_spec.compiler.drawing.figure import figure_of
@@ -206,7 +209,8 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
     populations = make_populations(census, connected.wired, sections.order)
     projected = make_projections(connected, populations)
     stages = sections.order.stages
-    connections = join(connected, projected.rules, None if stages is None else stages.lagging)
+    lagging = None if stages is None else stages.lagging
+    connections = join(connected, projected.rules, lagging, sections.render.style)
     slots = tuple(constants.slots)
     network = Network(
         name=name,

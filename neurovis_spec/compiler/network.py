@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import BoolArray, FloatArray, FloatColumn, IntArray, IntColumn, frozen, pieces
+from neurovis_spec.arrays import BoolArray, FloatArray, FloatColumn, IntArray, IntColumn, Texts, frozen, pieces
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.events.changes import Change
@@ -190,6 +190,10 @@ class Connections:
     #: of each connection of an entry whose weights are those of another one which connection of that it is, else −1;
     #: None where there are none
     tied: IntColumn | None = None
+    #: what each connection is called in pictures where the file of its edges says so, beside the ``labels`` of entries,
+    #: and what each has in the column whose values pictures tell apart; None where there is none
+    own_labels: Texts | None = None
+    styles: Texts | None = None
 
     def __len__(self) -> int:
         return len(self.sources)

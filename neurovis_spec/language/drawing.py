@@ -48,6 +48,7 @@ from neurovis_spec.language.located import (
     words,
 )
 from neurovis_spec.language.model import Keyed, Model, Short
+from neurovis_spec.language.tables import TEXTS_OF_EDGES, EdgeTexts, as_edge_texts
 from neurovis_spec.language.values import (
     Pair,
     PointField,
@@ -364,6 +365,17 @@ _PANEL = Either(
 FigureField = Annotated[tuple[PanelModel, ...], Leaf(_figure, Either((_PANEL, ListOf(_PANEL))))]
 
 
+class LinesModel(Model):
+    """How connections are drawn, beside their colour and their thickness."""
+
+    PLACE: ClassVar[str] = "'render: lines'"
+
+    style: Annotated[EdgeTexts, Leaf(as_edge_texts, TEXTS_OF_EDGES)] | None = Field(
+        None,
+        description="{column: NAME} of the files of edges: solid, dashed, … by its values, in their order as names.",
+    )
+
+
 class RenderModel(Model):
     """How the network is drawn."""
 
@@ -379,6 +391,7 @@ class RenderModel(Model):
         default_factory=dict,
         description="{neurons: state}: a state or an output whose value is their colour, in place of the activity.",
     )
+    lines: LinesModel | None = Field(None, description="How connections are drawn: {style: {column: NAME}}.")
     theme: ThemeField | None = Field(
         None, description="The colours: default, dark, print, paper, or other ones (default default)."
     )

@@ -66,10 +66,13 @@ from neurovis_spec.language.tables import (
     FILE,
     NAMES,
     PLACES,
+    TEXTS_OF_EDGES,
     WORDS,
     EdgesField,
+    EdgeTexts,
     FileReference,
     TableColumn,
+    as_edge_texts,
     as_file,
     as_names_column,
     as_places_column,
@@ -389,6 +392,13 @@ _TIED: Final = NotWith(
 )
 
 
+def _line_label(node: Node, info: ValidationInfo) -> Located[str] | EdgeTexts:
+    return as_edge_texts(node, info) if isinstance(node, Mapping) else as_text(node, info)
+
+
+LineLabelField = Annotated[Located[str] | EdgeTexts, Leaf(_line_label, Either((TEXT, TEXTS_OF_EDGES)))]
+
+
 class ConnectionModel(Model):
     """The body of a connection; a bare weight is read as ``{weight: …}``."""
 
@@ -475,7 +485,9 @@ class ConnectionModel(Model):
         Annotated[Pair, pair("bounds [low, high]")] | None,
         Needs(("plasticity",), "'bounds' hold plastic weights; there is no 'plasticity'"),
     ] = Field(None, description="[low, high] for plastic weights.")
-    label: TextField | None = Field(None, description="What it is called in pictures and tooltips.")
+    label: LineLabelField | None = Field(
+        None, description="What it is called in pictures and tooltips, or {column: NAME} of the file of its edges."
+    )
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
 
     @classmethod

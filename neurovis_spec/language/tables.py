@@ -5,7 +5,7 @@ In: nodes. Out: frozen values, whose names of columns know their places; no file
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from typing import Annotated, Final, NamedTuple, TypeGuard
 
 from pydantic import TypeAdapter, ValidationError, ValidationInfo
@@ -152,13 +152,16 @@ class EdgeRows(NamedTuple):
 
 class EdgeFile(NamedTuple):
     """A file of edges. ``columns`` are what is called otherwise in it: ``from``, ``to``, ``weight``, ``delay``; a delay
-    with a ``unit`` is a time; ``more`` are columns that others read of the edges."""
+    with a ``unit`` is a time; ``more`` are columns of numbers that others read of the edges, ``texts`` those of texts,
+    and ``perhaps`` columns of texts that are read where the file has them."""
 
     file: FileReference
     columns: tuple[tuple[str, Located[str]], ...] | None = None
     unit: Located[str] | None = None
     where: tuple[Condition, ...] = ()
     more: tuple[Located[str], ...] = ()
+    texts: tuple[Located[str], ...] = ()
+    perhaps: tuple[Located[str], ...] = ()
 
     @property
     def span(self) -> Span:
@@ -170,7 +173,8 @@ class EdgeFile(NamedTuple):
         """What is read of the file: the same whoever says so."""
         columns = None if self.columns is None else tuple((what, name.value) for what, name in self.columns)
         unit = None if self.unit is None else self.unit.value
-        return columns, unit, tuple(one.what for one in self.where), tuple(name.value for name in self.more)
+        further = (tuple(name.value for name in some) for some in (self.more, self.texts, self.perhaps))
+        return columns, unit, tuple(one.what for one in self.where), *further
 
 
 _UNIT: Final = words(*TIMES, abouts=TIME_ABOUTS)
@@ -195,7 +199,9 @@ EDGE_COLUMNS: Final = Map(
 )
 _EDGE_FILE: Final = Map(
     {
-        **FILE.known,
+        "file": Key(UNNAMED, "A file, by its path relative to this one."),
+        "csv": Key(UNNAMED, "The edges themselves, as a text, in place of a file."),
+        "key": FILE.known["key"],
         "columns": Key(EDGE_COLUMNS, "What the columns are called; the file may have others, too."),
         "where": WHERE,
     }
@@ -405,7 +411,35 @@ def number_of_default(node: Node, findings: Findings) -> float | Unknown:
     return UNKNOWN
 
 
+class EdgeTexts(NamedTuple):
+    """``{column: NAME}``: a column of texts of the edges of an entry."""
+
+    name: Located[str]
+    span: Span
+
+
+TEXTS_OF_EDGES: Final = Map(
+    {"column": Key(UNNAMED, "A column of the file of the entry's edges; an empty cell is no text.", required=True)}
+)
+
+
+def as_edge_texts(node: Node, info: ValidationInfo) -> EdgeTexts:
+    """``{column: NAME}``."""
+    if not isinstance(node, Mapping):
+        refuse(info, node, "a column of the file of an entry's edges", "write {column: NAME}")
+    keys = read_keys(node, TEXTS_OF_EDGES.known, findings_of(info)).mapping
+    name = keys.get("column")
+    if name is None:
+        refuse(info, node, "a column of the file of an entry's edges", "write {column: NAME}")
+    return EdgeTexts(as_text(name, info), node.span)
+
+
 def columns_of_edges(settings: Mapping) -> tuple[Located[str], ...]:
     """The columns of edges that settings name."""
-    found = (entry.value.get("column") for entry in settings.entries if isinstance(entry.value, Mapping))
+    return columns_in(entry.value for entry in settings.entries)
+
+
+def columns_in(values: Iterable[Node]) -> tuple[Located[str], ...]:
+    """The columns that values name."""
+    found = (value.get("column") for value in values if isinstance(value, Mapping))
     return tuple(Located(one.value, one) for one in found if isinstance(one, Scalar) and isinstance(one.value, str))

@@ -35,6 +35,11 @@ WHOLE: Final[Mapping[str, str]] = {"network": "the whole network", "pathways": "
 #: Those that are the picture of the network, of which a page has one.
 PICTURES: Final = ("network", "pathways")
 
+#: How lines are drawn, in their order: the first is that of lines without a value, where there are any.
+LINE_STYLES: Final = ("solid", "dashed", "finely dashed", "dash-dotted", "long-dashed", "dash-dot-dotted")
+#: The most values that these are for.
+MOST_STYLES: Final = len(LINE_STYLES) - 1
+
 
 class Viewpoint(NamedTuple):
     """From where a network in space is seen: degrees around the z axis, 0 in front (where y is greatest), and degrees

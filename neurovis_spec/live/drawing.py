@@ -101,7 +101,8 @@ def _shape(shape: Shape) -> dict[str, object]:
             return _shape(shape.spline)
         case Spline():
             what = {"kind": "line", "points": _points(shape.points), "stroke": shape.stroke, "width": shape.width}
-            return {**what, "dash": list(shape.dash), "opacity": shape.opacity}
+            flat = {"flat": True} if shape.flat else {}
+            return {**what, "dash": list(shape.dash), **flat, "opacity": shape.opacity}
         case Arrowhead():
             (dx, dy), what = shape.direction, {"kind": "head", "at": _points([shape.tip]), "fill": shape.fill}
             more = {

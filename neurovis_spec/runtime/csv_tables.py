@@ -95,7 +95,10 @@ def _edges(network: Network, weights: FloatArray, edges: EdgeNames) -> dict[str,
             s if w else "" for s, w in zip(steps.tolist(), whole, strict=True)
         ]
         columns["delay_seconds"] = _cells(exact * network.dt)
-    entries = lines.entries
+    entries, texts = lines.entries, {"label": lines.own_labels, network.render.style: lines.styles}
+    for name, own in texts.items():
+        if own is not None and name not in columns:
+            columns[name] = [own.of(row) for row in rows.tolist()]
     return {**columns, "entry": [entries[i] for i in lines.entry.whole()[rows].tolist()]}
 
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray, IntColumn, integers, reals
+from neurovis_spec.arrays import FloatArray, IntArray, IntColumn, Texts, integers, reals
 from neurovis_spec.compiler.drawing.drawing_settings import (
     Cell,
     LayoutSettings,
@@ -371,7 +371,18 @@ class _Gatherer:
             (*old.labels, *(None for _ in entries[len(old.labels) :])),
             synapses=(*old.synapses, *(None for _ in entries[len(old.labels) :])) if old.synapses else (),
             twins=self._twins(),
+            own_labels=self._shared(old.own_labels),
+            styles=self._shared(old.styles),
         )
+
+    def _shared(self, texts: Texts | None) -> Texts | None:
+        """The texts that all connections of each line have; none where they have several."""
+        if texts is None:
+            return None
+        numbers = np.array([own[0] for own in self.bundles], np.int64)
+        first = texts.numbers[numbers]
+        alike = [bool((texts.numbers[own] == one).all()) for own, one in zip(self.bundles, first, strict=True)]
+        return texts._replace(numbers=np.where(alike, first, -1))
 
     def _twins(self) -> IntColumn | None:
         """Which lines are there in both directions by symmetric pairs alone, so that each two of them are one."""

@@ -21,7 +21,7 @@ from neurovis_spec.scene.ends import EndArray, ends_of
 from neurovis_spec.scene.fading import seconds_of, told_times
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.lesions import FAINT
-from neurovis_spec.scene.model import Disc, Group, Point, Scene, Shape, Spline, Text, ended
+from neurovis_spec.scene.model import Disc, FlatSpline, Group, Point, Scene, Shape, Spline, Text, ended
 from neurovis_spec.scene.pathways import group_of
 from neurovis_spec.scene.plan import Plan
 from neurovis_spec.scene.shown_states import ShownStates
@@ -166,7 +166,8 @@ def _connections(planned: Plan, seen: Looks, glowing: npt.NDArray[np.bool_], tit
     for index in planned.order:
         line, width = planned.lines[index], widths[index]
         heads = (ended(end, width, strokes[index], ends[index]) for end in line.ends)
-        shapes: tuple[Shape, ...] = (Spline(line.points, strokes[index], width), *heads)
+        kind = FlatSpline if line.dash else Spline
+        shapes: tuple[Shape, ...] = (kind(line.points, strokes[index], width, line.dash), *heads)
         if glowing[index]:
             shapes = (Spline(line.points, planned.theme.glow, glows[index], glow=True), *shapes)
         if index in planned.beads:
@@ -176,17 +177,20 @@ def _connections(planned: Plan, seen: Looks, glowing: npt.NDArray[np.bool_], tit
 
 
 def data_attributes(network: Network) -> list[dict[str, str]]:
-    """``connection``, ``from``, ``to`` and ``delay`` of every connection; ``index`` where several share both ends."""
+    """``connection``, ``from``, ``to`` and ``delay`` of every connection; ``index`` where several share both ends, and
+    ``style``, what its line is solid or dashed for."""
     names, connections = network.neurons.names, network.connections
     ends = list(zip(connections.sources.tolist(), connections.targets.tolist(), strict=True))
-    sharing = Counter(ends)
-    result = []
+    sharing, styles = Counter(ends), connections.styles
+    result: list[dict[str, str]] = []
     for full, (source, target), delay in zip(network.connection_names, ends, connections.delays.tolist(), strict=True):
         plain = f"{names[source]} -> {names[target]}"
         data = {"connection": plain, "from": names[source], "to": names[target]}
         if sharing[source, target] > 1:
             data["index"] = full[len(plain) + 2 : -1] or "1"
         data["delay"] = str(delay)
+        if styles is not None and (style := styles.of(len(result))):
+            data["style"] = style
         result.append(data)
     return result
 
@@ -213,14 +217,17 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
     lows, highs = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
     twins, synapses = None if connections.twins is None else connections.twins.tolist(), connections.synapses
     rows = zip(connections.delays.tolist(), connections.entry.tolist(), strict=True)
+    own, styles = connections.own_labels, connections.styles
     for index, (delay, entry) in enumerate(rows):
+        style = "" if styles is None else styles.of(index)
         parts = [
             network.connection_names[index].replace("->", "→" if twins is None or twins[index] < 0 else "↔")
-            + (f": {called}" if (called := connections.labels[entry]) else ""),
+            + (f": {called}" if (called := (own and own.of(index)) or connections.labels[entry]) else ""),
             f"weight {_range(lows[index], highs[index])}",
             f"synapse {synapses[entry]}" if synapses and synapses[entry] else "",
             connections.learns[entry] or "",
             f"delay {delay}" if delay != 1 else "",
+            f"{network.render.style} {style}" if style else "",
             connections.descriptions[entry] or "",
             scaled[index],
         ]

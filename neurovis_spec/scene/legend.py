@@ -6,7 +6,7 @@ a heading, a sample and lines of text; those of scales are in ``legend_scales``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -16,12 +16,15 @@ from neurovis_spec.scene.delays import bead
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.legend_scales import FIRST_Y, SAMPLE_Y, SECOND_Y, SMALL, LegendEntry, heading, stroke
 from neurovis_spec.scene.lesions import FAINT
-from neurovis_spec.scene.model import Arrowhead, Disc, Group, Shape, Spline, Text, Theme, ended, shifted
+from neurovis_spec.scene.line_styles import DASHES, Styles
+from neurovis_spec.scene.model import Arrowhead, Disc, FlatSpline, Group, Shape, Spline, Text, Theme, ended, shifted
 from neurovis_spec.scene.teachers import dash
 from neurovis_spec.scene.themes import colours
 
 _ROW_GAP, _ENTRY_GAP = 10.0, 24.0
 _HEAD, _STROKE, _STROKE_GAP = 9.0, 36.0, 10.0
+#: how wide the word of a sample is at most
+_WIDEST_WORD = 90.0
 
 
 class Ends(NamedTuple):
@@ -47,6 +50,8 @@ class Contents:
     lesions: bool = False
     #: None without lines
     ends: Ends | None = None
+    #: None where all lines are solid
+    styles: Styles | None = None
     #: in which time activity fades, the shortest and the longest, of those that have a trace
     traces: tuple[float, ...] = ()
     #: the same of signals that are spikes, where activities are none
@@ -72,6 +77,8 @@ def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = Fal
         result.append(_ends_in(contents.ends, theme))
     if contents.bundles is not None:
         result.append(_bundle(contents.bundles, theme))
+    if contents.styles is not None:
+        result.append(_styles(contents.styles, theme))
     if contents.learns:
         result += legend_scales.glow(gains, theme)
     if contents.teaches:
@@ -162,16 +169,42 @@ def _ends_in(ends: Ends, theme: Theme) -> LegendEntry:
     if ends.said:
         called = {1: "excites", 0: "neither excites nor inhibits", -1: "inhibits"}
         words, samples = "line: what it does", [(called[kind], kind) for kind in ends.kinds]
-    wide = [_room(texts.width(sign, SMALL)) for sign, _ in samples]
+
+    def sample(place: int, x: float) -> Iterator[Shape]:
+        end = Arrowhead((x + _STROKE, SAMPLE_Y), (1.0, 0.0), _HEAD, 0.0, "")
+        end = ended(end, 2.0, theme.muted, samples[place][1])
+        yield stroke(x, end.notch[0] - x, theme.muted, 2.0)
+        yield end
+
+    return _side_by_side("End", [sign for sign, _ in samples], words, sample, theme)
+
+
+def _styles(styles: Styles, theme: Theme) -> LegendEntry:
+    """Lines that are solid, dashed, …, with the values that they stand for and the column of these."""
+
+    def sample(place: int, x: float) -> Iterator[Shape]:
+        dash = DASHES[styles.called[place][1]]
+        line = stroke(x, _STROKE, theme.muted, 2.0)
+        yield FlatSpline(line.points, line.stroke, line.width, dash) if dash else line
+
+    called = [texts.shorten(value, SMALL, _WIDEST_WORD) for value, _ in styles.called]
+    words = f"line: {texts.shorten(styles.column, SMALL, 2 * _WIDEST_WORD)}"
+    return _side_by_side("Style", called, words, sample, theme)
+
+
+def _side_by_side(
+    title: str, called: Sequence[str], words: str, sample: Callable[[int, float], Iterator[Shape]], theme: Theme
+) -> LegendEntry:
+    """Samples of lines, each with what it is called beneath, and what they are of; ``sample`` draws the one at a place
+    from an x on."""
+    wide = [_room(texts.width(one, SMALL)) for one in called]
     every = sum(wide) + (len(wide) - 1) * _STROKE_GAP
     across = max(every, texts.width(words, SMALL))
-    shapes: list[Shape] = [heading("End", theme)]
-    for place, (sign, kind) in enumerate(samples):
+    shapes: list[Shape] = [heading(title, theme)]
+    for place, one in enumerate(called):
         x = (across - every + wide[place] - _STROKE) / 2 + sum(wide[:place]) + place * _STROKE_GAP
-        end = Arrowhead((x + _STROKE, SAMPLE_Y), (1.0, 0.0), _HEAD, 0.0, "")
-        end = ended(end, 2.0, theme.muted, kind)
-        shapes += [stroke(x, end.notch[0] - x, theme.muted, 2.0), end]
-        shapes.append(Text((x + _STROKE / 2, FIRST_Y), sign, SMALL, theme.muted, "middle"))
+        shapes += sample(place, x)
+        shapes.append(Text((x + _STROKE / 2, FIRST_Y), one, SMALL, theme.muted, "middle"))
     shapes.append(Text((across / 2, SECOND_Y), words, SMALL, theme.muted, "middle"))
     return LegendEntry(tuple(shapes), across)
 

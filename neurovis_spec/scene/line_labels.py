@@ -1,8 +1,9 @@
-"""Labels of connections: what an author calls an entry, once beside one of its lines; what pathways hold.
+"""Labels of connections: what an author calls an entry, once beside one of its lines, or each connection of one; what
+pathways hold.
 
-In: lines, the labels of entries, what is said of pathways, what is in the way. Out: a Text for each that has room. Of
-several lines, and of several places on each, the one is taken where the text covers least; no text stands on a disc or
-on another. Of what there is no room for less is said where less can be.
+In: lines, the labels of entries and connections, what is said of pathways, what is in the way. Out: a Text for each
+that has room. Of several lines, and of several places on each, the one is taken where the text covers least; no text
+stands on a disc or on another. Of what there is no room for less is said where less can be.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ _SIZE, _WEIGHT = 10.0, 400
 _WIDEST = 160.0
 #: where they may be on their lines, the best place first, and how many lines of an entry are tried
 _PLACES, _MOST = (1 / 2, 0.4, 0.6, 0.3, 0.7), 12
+#: more labels of single connections than this would not be quiet: their tooltips have them
+_MOST_OWN = 300
 #: what lies on more than this (a disc, a text) is left out
 _TOO_MUCH = 10_000
 
@@ -32,20 +35,28 @@ _TOO_MUCH = 10_000
 def line_labels(
     network: Network, lines: Mapping[int, Line], obstacles: Obstacles, theme: Theme, picture: Rect
 ) -> dict[str, Text]:
-    """The texts by the names of their entries, none of which leaves the ``picture`` to a side; the room that each takes
-    is added to ``obstacles``."""
+    """The texts by the names of their entries or connections, none of which leaves the ``picture`` to a side; the room
+    that each takes is added to ``obstacles``."""
     connections = network.connections
     wanted: dict[int, list[int]] = {}
     if any(connections.labels):
         for index, entry in zip(lines, connections.entry[np.array([*lines], np.int64)].tolist(), strict=True):
             wanted.setdefault(entry, []).append(index)
     result: dict[str, Text] = {}
+
+    def write(name: str, label: str, members: Sequence[int]) -> None:
+        text = texts.shorten(label, _SIZE, _WIDEST, _WEIGHT)
+        found = _placed([lines[index] for index in members], (text,), obstacles, theme, picture)
+        if found is not None:
+            result[name] = found
+
     for entry, label in enumerate(connections.labels):
         if label and entry in wanted:
-            text = texts.shorten(label, _SIZE, _WIDEST, _WEIGHT)
-            found = _placed([lines[index] for index in _some(wanted[entry])], (text,), obstacles, theme, picture)
-            if found is not None:
-                result[connections.entries[entry]] = found
+            write(connections.entries[entry], label, _some(wanted[entry]))
+    if (own := connections.own_labels) is not None:
+        labelled = [index for index in lines if own.of(index)]
+        for index in labelled if len(labelled) <= _MOST_OWN else ():
+            write(network.connection_names[index], own.of(index), [index])
     return result
 
 

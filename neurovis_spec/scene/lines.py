@@ -30,6 +30,8 @@ class Line:
     head: float
     tail: Point | tuple[()] = ()
     back: Point = (0.0, 0.0)
+    #: lengths of dashes and gaps; empty: solid
+    dash: tuple[float, ...] = ()
 
     @property
     def end(self) -> Arrowhead:

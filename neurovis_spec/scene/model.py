@@ -45,6 +45,15 @@ class Spline:
     #: drawn beneath the line of its group; renderers mark it with the class ``glow``
     glow: bool = False
     opacity: float = 1.0
+    #: whether its dashes have butt caps
+    flat: ClassVar[bool] = False
+
+
+@dataclass(frozen=True, slots=True)
+class FlatSpline(Spline):
+    """A spline whose dashes have butt caps; without dashes like any other."""
+
+    flat: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, slots=True)

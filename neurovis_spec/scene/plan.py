@@ -45,6 +45,7 @@ from neurovis_spec.scene.labels import (
 from neurovis_spec.scene.legend_scales import LegendEntry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.line_labels import backed, line_labels, pathway_labels
+from neurovis_spec.scene.line_styles import Styles, styles_of
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Shape, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
@@ -208,6 +209,8 @@ class _Content:
     extent: Rect
     #: (n,) how near neurons in space are, None where all are in a plane
     near: FloatArray | None
+    #: None where all lines are solid
+    styles: Styles | None
 
 
 def _content(
@@ -247,6 +250,7 @@ def _content(
         said=[words.beside(strand) for strand in drawn.strands or ()],
         extent=extent,
         near=near,
+        styles=styles_of(network),
     )
 
 
@@ -297,6 +301,9 @@ def _on_page(content: _Content, framed: _Framed, gains: Gains, layout: Layout, t
         sector = box.sector
         obstacles.add_frame(outline(_mapped(box.rect, frame)) if sector is None else frame.map(sector.border(0.1)))
     drawn = dict(zip(kept, lines, strict=True))
+    if (styles := content.styles) is not None:
+        dashes = ((index, styles.dash(index, RADIUS * frame.scale)) for index in kept)
+        drawn = {index: replace(drawn[index], dash=dash) for index, dash in dashes}
     ground = bundles.Ground(network, centres, radii, _titled_groups(network, boxes), obstacles, picture)
     bands = bundles.bundled(content.left, ground, theme)
     return _OnPage(frame, centres, radii, drawn, guides, bands, boxes, obstacles, picture, framed.margin)
@@ -550,6 +557,7 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
             delays=delayed,
             lesions=bool(content.lesions),
             ends=content.ends,
+            styles=content.styles,
             traces=_least_and_most(told_times(network, seconds_of(network))),
             sent_traces=_least_and_most(told_times(network, sent_seconds_of(network))),
             unit=network.dt_unit,

@@ -6,8 +6,9 @@ pixel that the shape covers. Shares are computed from where edges run, never by 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import count
 from typing import Self, TypeVar
 
 import numpy as np
@@ -131,6 +132,45 @@ def _met(starts: FloatArray, ends: FloatArray, owners: IntArray) -> Pieces:
     before, after = np.zeros(len(owners), np.int8), np.zeros(len(owners), np.int8)
     before[1:], after[:-1] = how, how
     return Pieces(owners, starts, ends, first, last, before, after)
+
+
+def cut(pieces: Pieces, dashes: Mapping[int, Sequence[float]], scale: float) -> Pieces:
+    """Pieces, of which those of some curves are cut into dashes with flat ends: the lengths of ``dashes`` and gaps, by
+    the number of the curve, are in units of so many pixels."""
+    parts: list[tuple[FloatArray, FloatArray, int]] = []
+    for owner in np.unique(pieces.owners).tolist():
+        low, high = np.searchsorted(pieces.owners, (owner, owner + 1))
+        starts, ends = pieces.starts[low:high], pieces.ends[low:high]
+        if owner not in dashes:
+            parts.append((starts, ends, owner))
+            continue
+        corners = np.concatenate([starts, ends[-1:]])
+        lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+        for begin, end in _dashes(dashes[owner], scale, float(lengths[-1])):
+            at = np.concatenate([[begin], lengths[(lengths > begin + _SHORT) & (lengths < end - _SHORT)], [end]])
+            points = np.stack([np.interp(at, lengths, corners[:, axis]) for axis in (0, 1)], axis=1)
+            parts.append((points[:-1], points[1:], owner))
+    if not parts:
+        return pieces
+    each = np.repeat(np.arange(len(parts)), [len(starts) for starts, _, _ in parts])
+    starts, ends = (np.concatenate([part[side] for part in parts]) for side in (0, 1))
+    return replace(_met(starts, ends, each), owners=np.array([owner for _, _, owner in parts], np.int64)[each])
+
+
+#: no part of a dash is shorter, in pixels
+_SHORT = 1e-3
+
+
+def _dashes(lengths: Sequence[float], scale: float, most: float) -> Iterator[tuple[float, float]]:
+    """Where dashes begin and end along so many pixels."""
+    at = 0.0
+    for place in count():
+        if at >= most - _SHORT:
+            return
+        after = at + scale * lengths[place % len(lengths)]
+        if not place % 2:
+            yield at, min(after, most)
+        at = after
 
 
 @dataclass(frozen=True, slots=True)

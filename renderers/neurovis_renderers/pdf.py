@@ -211,7 +211,8 @@ class _Page:
                 way += f"{_numbers(*points[place], *points[place + 1], *points[place + 2])} c\n"
         style = f"{_number(shape.width)} w "
         if isinstance(shape, Spline) and shape.dash:
-            style += f"1 J [{_numbers(*shape.dash)}] 0 d "
+            caps = "" if shape.flat else "1 J "
+            style += f"{caps}[{_numbers(*shape.dash)}] 0 d "
         if isinstance(shape, Polyline) and shape.round:
             style += "1 J "
         if shape.opacity != 1:

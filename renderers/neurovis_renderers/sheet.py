@@ -111,7 +111,7 @@ class Sheet:
     def _colour(self, place: int, shape: Shape) -> bool:
         """Give a shape its places with their colours, and say whether it is one of the few that are drawn singly."""
         match shape:
-            case Spline() if not shape.dash:
+            case Spline() if shape.flat or not shape.dash:
                 self._splines.append((place, shape))
                 self.colours.append(packed(shape.stroke))
                 return False
@@ -174,6 +174,9 @@ class Sheet:
         points = np.array(list(chain.from_iterable(shape.points for _, shape in self._splines)), float).reshape(-1, 2)
         begins = np.concatenate([[0], np.cumsum([len(shape.points) for _, shape in self._splines])]).astype(np.int64)
         found = coverage.flatten(points * self.density, begins)
+        dashes = {number: shape.dash for number, (_, shape) in enumerate(self._splines) if shape.dash}
+        if dashes:
+            found = coverage.cut(found, dashes, self.density)
         places = np.array([place for place, _ in self._splines], np.int64)
         return replace(found, owners=places[found.owners])
 

@@ -135,7 +135,8 @@ def _spline(shape: Spline) -> str:
     kind = ' class="glow"' if shape.glow else ""
     dash = ""
     if shape.dash:
-        dash = f' stroke-linecap="round" stroke-dasharray="{" ".join(num(d) for d in shape.dash)}"'
+        caps = "" if shape.flat else ' stroke-linecap="round"'
+        dash = f'{caps} stroke-dasharray="{" ".join(num(d) for d in shape.dash)}"'
     opacity = f' stroke-opacity="{num(shape.opacity)}"' if shape.opacity != 1 else ""
     width = exact(shape.width)
     return f'{kind} d="{path(shape.points)}" stroke="{shape.stroke}" stroke-width="{width}"{dash}{opacity}'

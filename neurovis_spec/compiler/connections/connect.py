@@ -20,10 +20,12 @@ from neurovis_spec.arrays import (
     Indices,
     IntArray,
     IntColumn,
+    Texts,
     frozen,
     integers,
     narrow,
     reals,
+    texts_of,
 )
 from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, EntryContext
 from neurovis_spec.compiler.connections.plasticity import called, title_of
@@ -84,6 +86,12 @@ class Connected:
         """Whether connections have the states of a synapse together."""
         return any(one.carriers is not None for one in self.bundles)
 
+    def styles(self, column: str) -> Texts | None:
+        """What each connection has in a column of the files of edges; None where no file has it."""
+        columns = (one.columns for one in self.bundles)
+        found = (None if one is None else one.texts.get(column) for one in columns)
+        return texts_of(zip(found, self.sizes.tolist(), strict=True))
+
     @property
     def sizes(self) -> IntArray:
         """How many connections each entry makes."""
@@ -122,9 +130,12 @@ class Connected:
         )
 
 
-def connect(scopes: tuple[Scope, ...], census: Census, limits: Limits, seed: int) -> Connected:
+def connect(
+    scopes: tuple[Scope, ...], census: Census, limits: Limits, seed: int, style: Located[str] | None = None
+) -> Connected:
     """The entries of all scopes, a scope's own before those of the instances within it. What is invalid in one instance
-    of a module is so in all: it is said once. Of an invalid entry all that does not depend on that is checked."""
+    of a module is so in all: it is said once. Of an invalid entry all that does not depend on that is checked.
+    ``style`` is the column of edges whose values pictures tell apart."""
     result: list[Bundle] = []
     total = 0
     failed: set[str | None] = set()
@@ -141,7 +152,7 @@ def connect(scopes: tuple[Scope, ...], census: Census, limits: Limits, seed: int
         for place in sorted(range(len(named)), key=lambda place: named[place].tied):
             entry, before = named[place], findings.errors
             room = limits.connections - total
-            around = EntryContext(scope, directory, census, limits, seed, room, originals)
+            around = EntryContext(scope, directory, census, limits, seed, room, originals, style)
             bundle = EntryBuilder(around, *entry).build()
             sound = bundle is not UNKNOWN and findings.errors == before
             if not entry.tied:
@@ -213,9 +224,9 @@ def _ends(
     return arrow.normal, sources, targets
 
 
-def join(made: Connected, rules: Sequence[Indices], lagging: BoolArray | None = None) -> Connections:
+def join(made: Connected, rules: Sequence[Indices], lagging: BoolArray | None = None, style: str = "") -> Connections:
     """All entries as one structure of columns; ``rules`` has for each entry the Projection of each connection, or −1,
-    and ``lagging`` says which connections have a continuous delay, if any."""
+    ``lagging`` says which connections have a continuous delay, if any, and ``style`` is the column of their styles."""
     bundles, sizes = made.bundles, made.sizes
     tied = _tied(bundles)
     if tied is not None:  # what is tied changes as the rule of the other says
@@ -245,6 +256,8 @@ def join(made: Connected, rules: Sequence[Indices], lagging: BoolArray | None = 
         twins=_twins(bundles),
         synapses=synapses if any(synapses) else (),
         tied=None if tied is None else integers(tied),
+        own_labels=texts_of((one.labels, len(one.sources)) for one in bundles),
+        styles=made.styles(style),
     )
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, Indices, IntArray, narrow
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, Texts, narrow
 from neurovis_spec.compiler.connections.delays import DelayReader, Delays, Timed, text_of
 from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
 from neurovis_spec.compiler.names.references import Directory, few
@@ -48,22 +48,25 @@ class EdgeList(NamedTuple):
 
 
 class EdgeColumns(NamedTuple):
-    """Columns of a file of edges, one number a connection, NaN where a cell is empty. ``rows`` are those of the file,
-    ``places`` says which column each is, from 1."""
+    """Columns of a file of edges, one number a connection, NaN where a cell is empty, or one text. ``rows`` are those
+    of the file, ``places`` says which column each is, from 1, and ``header`` how all are called."""
 
     values: Mapping[str, FloatArray]
     rows: Indices
     places: Mapping[str, int]
+    texts: Mapping[str, Texts]
+    header: tuple[str, ...]
 
     @staticmethod
-    def of(table: EdgeTable) -> EdgeColumns | None:
-        """Those of a file; None where nobody named any."""
-        return EdgeColumns(table.more, narrow(table.rows()), table.columns) if table.more else None
+    def of(table: EdgeTable) -> EdgeColumns:
+        """Those of a file."""
+        return EdgeColumns(table.more, narrow(table.rows()), table.columns, table.texts, table.header)
 
     def at(self, kept: IntArray) -> EdgeColumns:
         """Those of some connections, in this order."""
         values = {name: values[kept] for name, values in self.values.items()}
-        return self._replace(values=values, rows=self.rows[kept])
+        texts = {name: texts.at(kept) for name, texts in self.texts.items()}
+        return self._replace(values=values, rows=self.rows[kept], texts=texts)
 
     def value(self, wanted: EdgeColumn, findings: Findings) -> FloatArray | Unknown:
         """One of them; UNKNOWN where cells are empty that must not be, which is reported."""
@@ -256,4 +259,5 @@ class EdgeReader:
             given = UNKNOWN if timed is UNKNOWN else timed.over(Delays(delays))
         if i is UNKNOWN or j is UNKNOWN or long or table.fault is not None or given is UNKNOWN:
             return UNKNOWN
-        return EdgeList(i, j, table.weights, given, EdgeColumns.of(table))
+        further = written.more or written.texts or written.perhaps
+        return EdgeList(i, j, table.weights, given, EdgeColumns.of(table) if further else None)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, narrow
+from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, Texts, narrow
 from neurovis_spec.compiler.connections.delays import DelayReader, Delays, Timed, check_below_step, text_of
 from neurovis_spec.compiler.connections.edges import EdgeColumns, EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends, counted
@@ -45,14 +45,14 @@ from neurovis_spec.compiler.values.arguments import Each, Settled, check_initial
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.matrices import Grid, draws_any, grid_of
-from neurovis_spec.diagnostics import Span
+from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.tree import draws, names
 from neurovis_spec.language.grammar import WHICH
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
-from neurovis_spec.language.tables import EdgeFile, FileReference, columns_of_edges, edge_column
+from neurovis_spec.language.tables import EdgeFile, EdgeTexts, FileReference, columns_of_edges, edge_column
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Delay, MatrixRows, Tie
 from neurovis_spec.language.words import Combine
@@ -94,6 +94,10 @@ class Bundle(NamedTuple):
     #: that is set in a run changes), of ``centres``, ``low``, ``high`` and ``rule``
     parts: tuple[Part, ...] = ()
     label: str | None = None
+    #: of an entry in whose file the connections have labels of their own these
+    labels: Texts | None = None
+    #: what else is read of the file of its edges
+    columns: EdgeColumns | None = None
     #: of an entry that makes no connection the neurons of its ends
     empty: tuple[Indices, Indices] | None = None
     route: Route = PLAIN_ROUTE
@@ -132,6 +136,8 @@ class Bundle(NamedTuple):
             delays=self.delays[each],
             parts=tuple(doubled(one, count) for one in self.parts),
             timing=None if self.timing is None else self.timing.at(each),
+            labels=None if self.labels is None else self.labels.at(each),
+            columns=None if self.columns is None else self.columns.at(each),
             synapse=synapse,
             symmetric=True,
         )
@@ -183,6 +189,8 @@ class EntryContext(NamedTuple):
     room: int
     #: the entries that weights may be tied to
     originals: Entries
+    #: the column of edges whose values pictures tell apart
+    style: Located[str] | None = None
 
 
 @dataclass(frozen=True)
@@ -241,7 +249,7 @@ class EntryBuilder:
         """The connections; UNKNOWN where anything of the entry is invalid, which is reported."""
         body, findings = self.body, self.constants.findings
         errors_before_entry = findings.errors
-        if body.label is not None:
+        if isinstance(body.label, Located):
             check_length(body.label, findings)
         route = self.route
         errors_before_shape = findings.errors
@@ -263,10 +271,10 @@ class EntryBuilder:
             self.constants.follow(self._parts_per_connection(centre, centre_cell_parts, shape))
         with self.constants.following() as bound_parts:  # ``_bounds`` sets the field of each
             bounds = self._bounds(weights)
-        rules, synapse = self._rules(shape), self._synapse(shape)
+        rules, synapse, labels = self._rules(shape), self._synapse(shape), self._labels(shape)
         if shape is UNKNOWN or weights is UNKNOWN or centres is UNKNOWN or bounds is UNKNOWN:
             return UNKNOWN
-        if rules is UNKNOWN or synapse is UNKNOWN:
+        if rules is UNKNOWN or synapse is UNKNOWN or labels is UNKNOWN:
             return UNKNOWN
         if (
             self.sources is UNKNOWN
@@ -311,7 +319,9 @@ class EntryBuilder:
                 *(part._replace(field="initial_centres" if learns["centre"] else "centres") for part in centre_parts),
                 *bound_parts,
             ),
-            label=None if body.label is None else body.label.value,
+            label=body.label.value if isinstance(body.label, Located) else None,
+            labels=labels,
+            columns=shape.columns,
             empty=None if len(shape.i) else (self.sources, self.targets),
             route=route,
             undelayed=written is None and not np.all(np.asarray(unsaid) | shape.has_delay),
@@ -532,9 +542,12 @@ class EntryBuilder:
         reader = EdgeReader(
             sources, targets, self.constants, self.context.scope.files, self._stream("weight"), self.context.room
         )
-        written = self.body.edges
+        written, label = self.body.edges, self.body.label
         if isinstance(written, EdgeFile):
-            written = written._replace(more=self._further_columns())
+            texts = (label.name,) if isinstance(label, EdgeTexts) else ()
+            style = self.context.style
+            perhaps = () if style is None else (style,)
+            written = written._replace(more=self._further_columns(), texts=texts, perhaps=perhaps)
         with self.constants.following() as parts:
             edges = reader.read(written)
         if edges is UNKNOWN:
@@ -547,6 +560,23 @@ class EntryBuilder:
         found = (name for choice in choices for name in columns_of_edges(choice.settings))
         return tuple({name.value: name for name in found}.values())
 
+    def _labels(self, shape: _Shape | Unknown) -> Texts | Unknown | None:
+        """What each connection is called in pictures; None where they are called as the entry is."""
+        label, findings = self.body.label, self.constants.findings
+        if not isinstance(label, EdgeTexts):
+            return None
+        if not isinstance(self.body.edges, EdgeFile):
+            if self._is_sound("edges"):
+                report_no_file(label.span, findings)
+            return UNKNOWN
+        if shape is UNKNOWN or shape.columns is None:
+            return UNKNOWN
+        found = shape.columns.texts[label.name.value]
+        for text in found.used:
+            if not check_length(Located(text, label.name.node), findings):
+                return UNKNOWN
+        return found
+
     def _table(self, shape: _Shape | Unknown) -> Callable[[Mapping], FloatArray | Unknown]:
         """What a mapping means as the value of a setting of connections: a column of their edges."""
 
@@ -555,8 +585,7 @@ class EntryBuilder:
             if column is UNKNOWN or not self._is_sound("edges"):
                 return UNKNOWN
             if not isinstance(self.body.edges, EdgeFile):
-                message = "'column' is one of the file of an entry's edges, and this entry has none"
-                findings.error("useless-key", node.span, message, "write edges: {file: …}")
+                report_no_file(node.span, findings)
                 return UNKNOWN
             return UNKNOWN if shape is UNKNOWN or shape.columns is None else shape.columns.value(column, findings)
 
@@ -785,6 +814,12 @@ class EntryBuilder:
                 findings.error("duplicate-name", span, message, "rename it in the rule")
         known = tuple(one for one in found if one is not UNKNOWN)
         return known if len(known) == len(found) else UNKNOWN
+
+
+def report_no_file(span: Span, findings: Findings) -> None:
+    """Report a column of edges at an entry that reads none of a file."""
+    message = "'column' is one of the file of an entry's edges, and this entry has none"
+    findings.error("useless-key", span, message, "write edges: {file: …}")
 
 
 def _of_both(one: Indices | Unknown, other: Indices | Unknown) -> Indices | Unknown:

@@ -150,6 +150,8 @@ class RenderSettings:
     traces: tuple[StatedTrace, ...] = ()
     #: what colours neurons in place of their activity; no neuron is in two
     show: tuple[ShownState, ...] = ()
+    #: the column of the files of edges by whose values lines are solid, dashed, …; "" for none
+    style: str = ""
     theme: str = "default"
     #: what the spec changes of it: colours by their names, and ``ends``
     colours: tuple[tuple[str, str], ...] = ()

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Literal, NamedTuple
 
 from neurovis_spec import plugins
+from neurovis_spec.compiler.connections.connect import Connected
 from neurovis_spec.compiler.drawing.drawing_settings import (
     Cell,
     LayoutSettings,
@@ -31,12 +32,13 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten
+from neurovis_spec.language.data.columns import no_column
 from neurovis_spec.language.drawing import GainValue, LayoutModel, ModuleLayoutModel, Range, RenderModel, ThemeModel
 from neurovis_spec.language.located import Formula, Located, value_or
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Pair, Reference
-from neurovis_spec.language.words import TOP, VIEWPOINTS, Direction, Viewpoint
+from neurovis_spec.language.words import MOST_STYLES, TOP, VIEWPOINTS, Direction, Viewpoint
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.likeness import suggest
 from neurovis_spec.themes import COLOURS
@@ -227,6 +229,7 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         change=() if gain is None else stated_gains(gain.change, "change", finder, constants),
         traces=_traces(model, finder, constants),
         show=_shown(model, finder),
+        style="" if (style := line_style(model)) is None else style.value,
         theme="default" if theme is None else value_or(theme.base, "default"),
         colours=() if theme is None else _theme_changes(theme),
         size=size,
@@ -237,6 +240,30 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         collapse=tuple(_collapsed_groups(model.collapse, finder.directory, constants.findings)),
         min_weight=least,
     )
+
+
+def line_style(model: RenderModel | None) -> Located[str] | None:
+    """The column of the files of edges by whose values lines are solid, dashed, …; None without one."""
+    style = None if model is None or model.lines is None else model.lines.style
+    return None if style is None else style.name
+
+
+def check_style(column: Located[str], connected: Connected, findings: Findings) -> None:
+    """Report a column that no file of edges has, or that has more values than lines can be told apart."""
+    headers = [one.columns.header for one in connected.bundles if one.columns is not None]
+    values = connected.styles(column.value)
+    if values is not None:
+        count = len(values.used)
+        if count > MOST_STYLES:
+            message = f"the column '{shorten(column.value)}' has {count:,} values; {MOST_STYLES} styles are the most"
+            hint = "take a column of fewer values; label: {column: NAME} at an entry writes them beside the lines"
+            findings.error("too-many-styles", column.span, message, hint)
+    elif connected.complete and headers:
+        error = no_column(headers[0], column.value, column)
+        findings.error(error.code, column.span, str(error), error.hint)
+    elif connected.complete:
+        message = "'column' is one of the files of edges, and no entry reads any"
+        findings.error("useless-key", column.span, message, "write edges: {file: …} at an entry")
 
 
 def _traces(model: RenderModel, finder: Finder, constants: Constants) -> tuple[StatedTrace, ...]:

@@ -170,4 +170,5 @@ class Files:
         def read(room: Room) -> EdgeTable | Unknown:
             return read_edges(self._named(written.file), self.findings, written=written, room=room)
 
-        return self._edges.get((path.value, None if key is None else key.value, written.what), most, room, read)
+        file = path.value, written.file.inline, None if key is None else key.value
+        return self._edges.get((*file, written.what), most, room, read)

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, Indices, IntArray, IntColumn, integers, narrow
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, IntColumn, Texts, integers, narrow
 from neurovis_spec.language.data.cells import (
     COMMAS,
     NO_COMMENT,
@@ -88,6 +89,9 @@ class EdgeTable:
     #: further columns of numbers, NaN where a cell is empty, by their names, and where these stand, from 1
     more: Mapping[str, FloatArray] = field(default_factory=dict)
     columns: Mapping[str, int] = field(default_factory=dict)
+    #: further columns of texts, by their names, and what all columns are called
+    texts: Mapping[str, Texts] = field(default_factory=dict)
+    header: tuple[str, ...] = ()
     #: what was found by looking at the file, in words; nothing of one as we write them
     about: str = ""
 
@@ -122,6 +126,8 @@ class Written(NamedTuple):
     separator: Separator = COMMAS
     unit: str | None = None
     picked: tuple[Picked, ...] = ()
+    #: where further columns of texts stand, by their names
+    texts: Mapping[str, int] = MappingProxyType({})
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -150,7 +156,8 @@ def parse_edges(parts: list[bytes], room: Room | None = None, file: EdgeFile | N
     asked with the number of edges before any is made. Raises CellError where not a row is invalid but the header, or
     the file as a whole."""
     strip_end(parts)
-    separator = separator_of(parts, "" if file is None else file.file.path.value) if parts else COMMAS
+    path = "" if file is None or file.file.inline else file.file.path.value
+    separator = separator_of(parts, path) if parts else COMMAS
     most = lines_in(parts)
     if room is not None and not (file and file.where):  # else it is asked while rows are taken
         room(most)
@@ -203,19 +210,30 @@ def edges_of(sheet: Sheet, file: EdgeFile, room: Room | None = None) -> EdgeTabl
         seconds=_in_seconds(found["delay_seconds"], written.factor) if "delay_seconds" in written.places else None,
         more={what.removeprefix(MORE): values for what, values in found.items() if what.startswith(MORE)},
         columns={what.removeprefix(MORE): place + 1 for what, place in written.places.items()},
+        texts={name: _texts_of(sheet.texts(Located(name, file.file.path.node))) for name in written.texts},
+        header=sheet.header,
         about=sheet.about,
     )
+
+
+def _texts_of(cells: Sequence[str]) -> Texts:
+    """Texts, "" where there is none."""
+    number_of = {text: number for number, text in enumerate(dict.fromkeys(filter(None, cells)))}
+    return Texts(tuple(number_of), narrow(np.array([number_of.get(text, -1) for text in cells], dtype=np.int64)))
 
 
 def written_of(header: list[str], file: EdgeFile | None, separator: Separator) -> Written:
     """Where each column stands that is wanted. Raises CellError."""
     if file is None:
         return Written(header, _columns(header, ()), separator)
-    others = {*(one.column.value for one in file.where), *(name.value for name in file.more)}
+    further = (*file.more, *file.texts, *file.perhaps)
+    others = {*(one.column.value for one in file.where), *(name.value for name in further)}
     places = _columns(header, others) if file.columns is None else _called(header, dict(file.columns), file.unit)
-    further = {f"{MORE}{name.value}": find_column(header, name) for name in file.more}
+    more = {f"{MORE}{name.value}": find_column(header, name) for name in file.more}
+    texts = [*file.texts, *(name for name in file.perhaps if name.value in header)]
+    found = {name.value: find_column(header, name) for name in texts}
     unit = None if file.unit is None else file.unit.value
-    return Written(header, {**places, **further}, separator, unit, picked(file.where, header))
+    return Written(header, {**places, **more}, separator, unit, picked(file.where, header), found)
 
 
 def _called(header: list[str], names: dict[str, Located[str]], unit: Located[str] | None) -> dict[str, int]:
@@ -278,6 +296,8 @@ class _Reader:
         self._written = written
         self._places = written.places
         self._names = Names()
+        #: of each further column of texts these, and the number of each edge's
+        self._texts = {name: (Names(), np.empty(most, dtype=np.int32)) for name in written.texts}
         self.count = 0
         self._rows = 0
         self._begins, self._ends = np.empty(most, dtype=np.int32), np.empty(most, dtype=np.int32)
@@ -287,10 +307,12 @@ class _Reader:
         self._offsets: list[Indices] = []
         #: edges that were taken one by one since: where they begin and end, row, numbers
         self._singles = array("d")
+        self._single_texts: list[list[str]] = []
 
     def table(self) -> EdgeTable:
         """The table of all rows taken so far."""
         self._add_singles()
+        self._check_texts()
         if self.faults.first() is None:
             for one in self._written.picked:
                 one.check()
@@ -307,6 +329,11 @@ class _Reader:
             more={name.removeprefix(MORE): values for name, values in numbers.items() if name.startswith(MORE)},
             about=self._written.about(self.count, self._rows),
             columns={name.removeprefix(MORE): place + 1 for name, place in self._places.items()},
+            texts={
+                name: Texts(tuple(names.known), narrow(numbers[: self.count]))
+                for name, (names, numbers) in self._texts.items()
+            },
+            header=tuple(self._written.header),
         )
 
     def _add(self, begins: npt.NDArray[Any], ends: npt.NDArray[Any], rows: IntArray, *numbers: FloatArray) -> None:
@@ -323,12 +350,31 @@ class _Reader:
         self._offsets.append(_in_brief(rows - np.arange(at.start, at.stop)))
         self.count = at.stop
 
+    def _add_texts(self, columns: Iterable[npt.NDArray[Any]]) -> None:
+        """The further texts of the edges that were added last, as numbers, column by column."""
+        for (_, numbers), found in zip(self._texts.values(), columns, strict=True):
+            numbers[self.count - len(found) : self.count] = found
+
     def _add_singles(self) -> None:
         """Add what was taken one by one."""
         if self._singles:
             begins, ends, rows, *numbers = np.array(self._singles).reshape(-1, 3 + len(self._written.numbers)).T
             self._add(begins, ends, rows.astype(np.int64), *numbers)
-            del self._singles[:]
+            columns = zip(*self._single_texts, strict=True)
+            self._add_texts(
+                np.array([names[cell] for cell in cells])
+                for (names, _), cells in zip(self._texts.values(), columns, strict=True)
+            )
+            del self._singles[:], self._single_texts[:]
+
+    def _check_texts(self) -> None:
+        """Report the first of each further text that cannot be shown."""
+        for name, (names, numbers) in self._texts.items():
+            for number in [number for number, text in enumerate(names.known) if not text.isprintable()]:
+                edge = int(np.argmax(numbers[: self.count] == number))
+                row = edge + int(integers(*self._offsets)[edge])
+                message = "a text has a character here that cannot be shown"
+                self.faults.note(in_cell(row, self._written.texts[name] + 1, message))
 
     def goes_on(self, lines: bytes, number: int) -> bool:
         """Take lines, of which the first has this number; False where there is no reading on."""
@@ -369,6 +415,8 @@ class _Reader:
         self._add_singles()
         if len(rows):
             self._add(begins, ends, number + rows, *numbers)
+            written = ((names, lines.column(self._written.texts[name])) for name, (names, _) in self._texts.items())
+            self._add_texts(names.of(cells if chosen is None else cells.some(chosen)) for names, cells in written)
         return True
 
     def _one(self, row: Row) -> None:
@@ -391,6 +439,7 @@ class _Reader:
         if all(ends):
             begin, end = (self._names[name] for name in ends)
             self._singles.extend((begin, end, number, *numbers))
+            self._single_texts.append([cells[place] for place in self._written.texts.values()])
 
     def _number(self, row: int, cells: list[str], name: str) -> float:
         """What a row has in the column of this name; NaN where that is nothing, or invalid, which is reported."""

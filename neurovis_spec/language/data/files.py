@@ -213,7 +213,7 @@ def read_edges(
     made. Where rows are invalid, these are reported, and the table has a ``fault``. Codes: those of ``read_data`` and
     of ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``useless-key``.
     """
-    suffix = Path(named.path).suffix.lower()
+    suffix = ".csv" if named.inline else Path(named.path).suffix.lower()
     if suffix not in (TABLE_FILES if written else TEXT_FILES):
         message = f"edges are read from a .csv file, not from '{_short(named.path)}'"
         findings.error("file-format", named.span, message)
@@ -221,7 +221,7 @@ def read_edges(
     if named.key is not None:
         _refuse_key(named.key, findings)
         return UNKNOWN
-    parts = _read_parts(named, findings, _PART)
+    parts = [_inline(named)] if named.inline else _read_parts(named, findings, _PART)
     if parts is UNKNOWN:
         return UNKNOWN
     from neurovis_spec.language.data.edge_list import edges_of, parse_edges
@@ -234,7 +234,8 @@ def read_edges(
     except CellError as error:
         _refuse(error, named.called, named.span, findings)
         return UNKNOWN
-    note(named, table.about, findings)
+    if not named.inline:
+        note(named, table.about, findings)
     if table.fault is not None:
         _refuse(table.fault, named.called, named.span, findings)
     return table
@@ -250,7 +251,7 @@ def read_sheet(named: NamedFile, where: tuple[Condition, ...], findings: Finding
     if named.key is not None:
         _refuse_key(named.key, findings)
         return UNKNOWN
-    data = named.path.encode("utf-8", "replace") if named.inline else read_data(named, findings)
+    data = _inline(named) if named.inline else read_data(named, findings)
     if data is UNKNOWN:
         return UNKNOWN
     try:
@@ -261,6 +262,11 @@ def read_sheet(named: NamedFile, where: tuple[Condition, ...], findings: Finding
     if not named.inline:
         note(named, sheet.about, findings)
     return sheet
+
+
+def _inline(named: NamedFile) -> bytes:
+    """What stands in the spec, as the bytes of a file."""
+    return named.path.encode("utf-8", "replace")
 
 
 def _sheet_in(data: bytes, named: NamedFile, where: tuple[Condition, ...], most: int | None = None) -> Sheet:

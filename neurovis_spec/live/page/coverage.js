@@ -88,6 +88,46 @@ export function flattened(points, scale, [left, top]) {
   return { at: Float64Array.from(at), along, parts: last / 2 };
 }
 
+/** The dashes of a chain, of these lengths and gaps in pixels, each a chain with flat ends.
+ * @param {Chain} chain @param {number[]} lengths @returns {Chain[]} */
+export function dashes({ at, along, parts }, lengths) {
+  /** @type {Chain[]} */
+  const found = [];
+  let place = 0,
+    left = lengths[0];
+  /** @type {number[]} */
+  let points = [at[0], at[1]],
+    ways = [along[0], along[1]];
+  const end = () => {
+    if (place % 2 === 0 && points.length > 2)
+      found.push({ at: Float64Array.from(points), along: Float64Array.from(ways), parts: points.length / 2 - 1 });
+  };
+  for (let i = 0; i < 2 * parts; i += 2) {
+    const dx = at[i + 2] - at[i],
+      dy = at[i + 3] - at[i + 1],
+      length = Math.sqrt(dx * dx + dy * dy),
+      way = [dx / length, dy / length];
+    let done = 0;
+    while (length - done > left) {
+      done += left;
+      const x = at[i] + done * way[0],
+        y = at[i + 1] + done * way[1];
+      points.push(x, y);
+      ways.push(...way);
+      end();
+      place += 1;
+      left = lengths[place % lengths.length];
+      points = [x, y];
+      ways = [...way];
+    }
+    left -= length - done;
+    points.push(at[i + 2], at[i + 3]);
+    ways.push(along[i + 2], along[i + 3]);
+  }
+  end();
+  return found;
+}
+
 /** A part of the window: which pixels have colours that change, where each one's entries end, the sum of what stays.
  * @typedef {{left: number, top: number, lines: number[], discs: number[], slots: Uint32Array,
  *   where: Uint32Array, ends: Uint32Array, entries: Uint32Array, base: Float64Array}} Tile */

@@ -3,7 +3,7 @@
  */
 
 import { channels, palette } from './colours.js';
-import { flattened, packed } from './coverage.js';
+import { dashes, flattened, packed } from './coverage.js';
 import { enter, leave, Mosaic } from './mosaic.js';
 
 /** @typedef {import('./protocol.js').Scene} Scene */
@@ -17,19 +17,20 @@ import { enter, leave, Mosaic } from './mosaic.js';
 /** @typedef {import('./coverage.js').Tile} Tile */
 /** @typedef {import('./coverage.js').Round} Round */
 /** @typedef {import('./coverage.js').End} End */
-/** A line as it was laid out: from these points, as this chain, in these tiles, which have room for this reach.
- * @typedef {{points: number[], head: Shape, end: End, start: End | null, box: number[], chain: Chain, tiles: Tile[], reach: number, room: number,
+/** A line as it was laid out: from these points, as this chain, which is drawn whole or as dashes, in these tiles, which have room for this reach.
+ * @typedef {{points: number[], head: Shape, end: End, start: End | null, box: number[], chain: Chain, strokes: Chain[], tiles: Tile[], reach: number, room: number,
  *   width: number, glow: number, ending: number, share: number}} LaidLine */
 /** What lies otherwise when another `points`, `head` or `at` is put in place of the one before.
- * @typedef {{id: string, index: number, points: number[], head: Shape, tail: Shape | null, rest: Shape[],
+ * @typedef {{id: string, index: number, points: number[], dash: number[], head: Shape, tail: Shape | null, rest: Shape[],
  *   laid: LaidLine | null}} Line */
 /** @typedef {{id: string, index: number, shape: Shape, rest: Shape[], laid: (Round & {tiles: Tile[]}) | null}} Disc */
 
 /** What a line is drawn of: its points, its head, one at its other end if it leads both ways, and what lies on it.
- * @param {Shape[]} shapes @returns {{points: number[], head: Shape, tail: Shape | null, rest: Shape[]}} */
-function parts([{ points }, head, ...rest]) {
+ * @param {Shape[]} shapes
+ * @returns {{points: number[], dash: number[], head: Shape, tail: Shape | null, rest: Shape[]}} */
+function parts([{ points, dash }, head, ...rest]) {
   const tail = rest[0]?.kind === 'head' ? rest[0] : null;
-  return { points, head: { ...head }, tail, rest: tail ? rest.slice(1) : rest };
+  return { points, dash, head: { ...head }, tail, rest: tail ? rest.slice(1) : rest };
 }
 
 /** The path of a cubic spline. @param {number[]} points @returns {Path2D} */
@@ -356,7 +357,14 @@ export class Drawing {
       }
       enter(tiles, 'lines', at);
       mosaic.spoil(tiles);
-      line.laid = { ...now, reach: reach + SPARE, room: room + SPARE, box: around(points), chain, tiles };
+      const { dash } = line,
+        strokes = dash.length
+          ? dashes(
+              chain,
+              dash.map((length) => length * scale),
+            )
+          : [chain];
+      line.laid = { ...now, reach: reach + SPARE, room: room + SPARE, box: around(points), chain, strokes, tiles };
     });
   }
 
@@ -378,7 +386,13 @@ export class Drawing {
       if (!laid) continue;
       coverage.head(laid.end, laid.share, at);
       if (laid.start) coverage.head(laid.start, laid.share, at);
-      coverage.line(laid.chain, laid.width * half, laid.glow * half, laid.share, at, colours.glow);
+      const { chain, strokes, share } = laid,
+        glow = laid.glow * half;
+      if (strokes[0] === chain) coverage.line(chain, laid.width * half, glow, share, at, colours.glow);
+      else {
+        for (const stroke of strokes) coverage.line(stroke, laid.width * half, 0, share, at, colours.glow);
+        if (glow > 0) coverage.line(chain, 0, glow, share, at, colours.glow);
+      }
     }
     coverage.picture(pictures.back);
   }
@@ -456,7 +470,7 @@ export class Drawing {
         context.globalAlpha *= shape.opacity;
         context.strokeStyle = shape.stroke;
         context.lineWidth = shape.width;
-        context.lineCap = shape.dash.length ? 'round' : 'butt';
+        context.lineCap = shape.dash.length && !shape.flat ? 'round' : 'butt';
         context.setLineDash(shape.dash);
         context.stroke(spline(shape.points));
         context.restore();

@@ -5,7 +5,7 @@
 import { isStill } from './camera.js';
 
 /** @typedef {{kind: string, at: number[], points: number[], size: number[], along: number[], colours: string[],
- *   dash: number[], font: number, radius: number, width: number, length: number, half: number, fill: string, stroke: string,
+ *   dash: number[], flat?: boolean, font: number, radius: number, width: number, length: number, half: number, fill: string, stroke: string,
  *   opacity: number, end: number, text: string, subscript: string, anchor: string, weight: number, halo: string,
  *   onDisc: boolean, upward: boolean, columns: number, rows: number, pixels: string}} Shape */
 /** @typedef {{id: string, data: Object<string, string>, title: string, shapes: Shape[]}} Group */
