@@ -99,7 +99,7 @@ def test_texts_of_edges_however_the_rows_are_read(folder: Path, kind: str) -> No
     else:
         columns = dict(zip(rows[0], zip(*rows[1:], strict=True), strict=True))
         arrays = {name: np.array(cells, float if name == "N" else None) for name, cells in columns.items()}
-        np.savez(folder / "worm.npz", **arrays)
+        np.savez(folder / "worm.npz", allow_pickle=False, **arrays)
         other = network_of((STYLED + STYLE).replace("worm.csv", "worm.npz"), folder)
     for one in (network, other):
         assert one.connections.own_labels is not None
