@@ -252,7 +252,10 @@ def numbers_of(cells: bytes) -> NDArray[np.float64] | None:
         try:
             values = np.array(list(map(float, texts)))
         except ValueError:  # as of an empty one
-            values = np.array([float(text.strip() or "nan") for text in texts])
+            commas = np.flatnonzero(np.frombuffer(cells, np.uint8) == ord(","))
+            filled = np.diff(commas, prepend=-1, append=len(cells)) > 1
+            values = np.full(len(texts), np.nan)
+            values[filled] = [float(text.strip() or "nan") for text in filter(None, texts)]
     except ValueError:
         return None
     return None if np.isinf(values).any() else values
