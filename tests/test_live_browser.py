@@ -21,6 +21,7 @@ from neurovis_spec.live.access import Access
 from neurovis_spec.live.commands import REQUESTS
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.live import listen
+from neurovis_spec.live.protocol import findings_message
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.simulated import SimulatedSource
@@ -265,11 +266,24 @@ def test_it_connects_again_by_itself(tmp_path: Path) -> None:
             async with chromium(tmp_path) as opened:
                 await opened.call("Page.navigate", url=access.url())
                 await opened.until(f"{STEP} > 2")
+                assert await opened.ask("document.querySelector('#lost').hidden")
+                hub.tell(findings_message("warning: this and that", False))
+                await opened.until("document.querySelector('#noticed').textContent == 'warning: this and that'")
+                assert await opened.ask("document.querySelector('#findings').checkVisibility()")
+                await opened.ask("document.querySelector('#seen').click()")
+                assert not await opened.ask("document.querySelector('#findings').checkVisibility()")
+                await opened.ask(
+                    "const speed = document.querySelector('#speed'); speed.value = 'max'; speed.onchange()"
+                )
+                await opened.until("/^×[0-9.]+ · numpy$/.test(document.querySelector('#rate').textContent)")
+                await opened.ask("speed.value = '0.25'; speed.onchange()")
+                await opened.until("document.querySelector('#rate').textContent == 'numpy'")
                 await server.stop()
                 await opened.until("document.querySelector('#told').textContent.startsWith('not connected')")
+                assert await opened.ask("document.querySelector('#lost').checkVisibility()")
                 server = Server(access, hub, run)
                 await server.start(listen("127.0.0.1", access.port))
-                await opened.until(f"{STEP} > 2")
+                await opened.until(f"{STEP} > 2 && document.querySelector('#lost').hidden")
                 assert all("WebSocket connection" in error for error in opened.errors)
         finally:
             run.end()

@@ -93,6 +93,21 @@ def test_a_page_begins_with_the_output_its_target_and_the_error(tmp_path: Path) 
             assert await drawn(opened, 1)
             await opened.ask("document.querySelectorAll('.of')[1].click()")  # of an error there is nothing to be held
             assert await opened.ask(TITLE.format(2)) == ""
+            assert await opened.ask("document.querySelector('#unit').textContent") == "time, s"
+            assert await opened.ask(INK.format("document.querySelector('#ticks')"))
+            box = "document.querySelector('.trace').getBoundingClientRect()"
+            left, top, width = await numbers(opened, *(f"{box}.{name}" for name in ("left", "top", "width")))
+            await opened.point(left + 8 + 0.5 * (width - 16), top + 20)
+            under = str(await opened.ask("document.querySelector('#under').innerText")).replace("−", "-").split("\n")
+            step = last - 500
+            assert abs(float(under[0].removesuffix(" s")) / 0.05 - step) < 2
+            told = [line.split("  ") for line in under[1:]]
+            assert [name for name, _ in told] == ["O", "T", "T - O"]
+            for (_, value), of in zip(told, (run["O"], run["T"], error), strict=True):
+                first = float(value.split(" … ")[0])
+                assert min(abs(of[step - 3 : step + 4] - first)) < 0.02
+            await opened.point(left, 10)
+            assert await opened.ask("document.querySelector('#under').hidden")
 
     asyncio.run(main())
 

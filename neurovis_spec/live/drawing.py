@@ -59,6 +59,7 @@ def content(
 ) -> bytes:
     """The scene and what a page must know of its network, as JSON, compressed; ``rows`` are those of its matrix,
     ``more`` further constants, ``declared`` what can be turned."""
+    time = network.shown_dt
     value = {
         "name": network.name,
         "title": scene.title,
@@ -67,6 +68,7 @@ def content(
         "density": scene.density,
         "theme": asdict(scene.theme),
         "dt": network.dt if network.dt_given else None,
+        "time": None if time is None else {"step": time.length, "unit": time.unit},
         "discs": len(network.neurons),
         "lines": len(network.connections),
         "order": rows.neurons.tolist(),

@@ -130,6 +130,7 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         turned=[_turned(entry) for entry in status.turned[-_LISTED:]],
         events=list(status.events[:_LISTED]),
         appearance=asdict(status.appearance),
+        backend=status.backend,
     )
 
 

@@ -43,7 +43,7 @@ P = ParamSpec("P")
 @dataclass(frozen=True, slots=True)
 class Status:
     """What a client is told of a run when it changes: ``ended`` where there is no further step; ``events``, the steps
-    at which the spec has some."""
+    at which the spec has some; ``backend``, what makes the steps, "" where that is not known."""
 
     playing: bool
     speed: float
@@ -55,6 +55,7 @@ class Status:
     turned: tuple[Turned, ...]
     events: tuple[int, ...]
     appearance: Appearance
+    backend: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -370,6 +371,7 @@ class Run:
             turned=source.turned,
             events=self._events(),
             appearance=self.appearance,
+            backend=source.backend,
         )
         seen = source.seen()
         glance, reach = self._view.glance(seen), source.reach

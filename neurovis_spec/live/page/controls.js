@@ -3,6 +3,7 @@
  */
 
 import { followKeys } from './keys.js';
+import { Rate } from './rate.js';
 import { say } from './say.js';
 
 /** @typedef {import('./protocol.js').Status} Status */
@@ -26,6 +27,10 @@ export class Controls {
     this.speed = part('speed');
     this.told = part('told');
     this.findings = part('findings');
+    this.rate = new Rate(part('rate'));
+    part('seen').onclick = () => {
+      this.findings.hidden = true;
+    };
     /** @type {Object<string, () => void>} */
     const actions = {
       restart: () => link.ask('restart'),
@@ -62,6 +67,7 @@ export class Controls {
     this.play.textContent = status.playing ? '❚❚' : '▶';
     this.play.setAttribute('aria-label', status.playing ? 'pause' : 'play');
     this.speed.value = status.speed;
+    this.rate.status(status);
     this.owner = status.owner;
     for (const id of ['restart', 'back', 'play', 'step', 'speed', 'before', 'next', 'svg', 'npz', 'film']) {
       const isEvent = id === 'before' || id === 'next';
@@ -73,6 +79,7 @@ export class Controls {
   frame(look) {
     /** @type {HTMLButtonElement} */ (part('branch')).disabled = !this.owner || look.step === look.last;
     this.tell(`step ${look.step}`);
+    this.rate.show(look.step, this.link.scene?.dt ?? null);
   }
 
   /** Why something is not done. @param {string} reason */
@@ -88,7 +95,7 @@ export class Controls {
 
   /** What is wrong with an edited spec, or was noticed. @param {{text: string, errors: boolean}} found */
   found(found) {
-    this.findings.textContent = found.text;
+    part('noticed').textContent = found.text;
     this.findings.hidden = !found.text;
     this.findings.classList.toggle('mild', !found.errors);
   }

@@ -3,6 +3,7 @@
  */
 
 import { Attention } from './attention.js';
+import { Axis } from './axis.js';
 import { Body } from './body.js';
 import { Camera } from './camera.js';
 import { channels, luminance } from './colours.js';
@@ -77,6 +78,7 @@ function show() {
   outline.show(look);
   controls.frame(look);
   scrubber.show(look);
+  axis.show();
   strips.show();
   if (link.scene) body.show(look, link.scene);
   if (more) redraw();
@@ -123,6 +125,7 @@ const link = new Link({
     part('titled').textContent = scene.title;
     attention.use(scene);
     strips.use();
+    axis.use(scene.time);
     if (first) strips.begin(scene.curves);
     turning.use(scene);
     outline.use(scene);
@@ -165,6 +168,7 @@ const link = new Link({
     }
   },
   link(open) {
+    part('lost').hidden = open;
     if (open) attention.ask();
     else controls.refuse('not connected, trying again …');
   },
@@ -185,7 +189,8 @@ const attention = new Attention(
 );
 const outline = new Outline(attention, part, (id) => go(id));
 const scrubber = new Scrubber(link, part, redraw);
-const strips = new Strips(link, attention, scrubber, part('strips'));
+const axis = new Axis(scrubber, part);
+const strips = new Strips(link, attention, scrubber, axis, part('strips'), part('under'));
 const body = new Body(part('embodied'), part('posed'), part('bodily'), redraw);
 
 /** Show the matrix in place of the picture, or the picture. @param {boolean} asMatrix */

@@ -20,7 +20,8 @@ import { isStill } from './camera.js';
  *   fineness: number, shares: number, share: number, isBar: number, isFaint: number, isNegative: number,
  *   isClamped: number, isUndefined: number, scale: number, left: number, top: number}} Constants */
 /** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
- *   theme: Theme, dt: number | null, discs: number, lines: number, parameters: Declared[],
+ *   theme: Theme, dt: number | null,
+ *   time: {step: number, unit: string} | null, discs: number, lines: number, parameters: Declared[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
  *   themed: boolean, named: string[][], names: number[], curves: Curve[], order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
  *   told: string[], groups: Group[]}} Scene */
@@ -37,7 +38,7 @@ import { isStill } from './camera.js';
  *   solids: [number[], number[]][]}} Skeleton */
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
  *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
- *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains}} Status */
+ *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string}} Status */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
  *   | {type: 'body', skeleton: Skeleton | null, start: number[]}
  *   | {type: 'findings', text: string, errors: boolean}

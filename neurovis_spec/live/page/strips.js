@@ -7,15 +7,18 @@ import { namesOf } from './protocol.js';
 import { THUMB } from './scrubber.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
+/** @typedef {import('./axis.js').Axis} Axis */
 /** @typedef {import('./protocol.js').Curve} Curve */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Raster} Raster */
 /** @typedef {import('./protocol.js').Traces} Traces */
 /** @typedef {import('./scrubber.js').Scrubber} Scrubber */
+/** The ranges of a trace. @typedef {{trace: Float32Array, first: number, every: number}} Seen */
 /** What it shows of a neuron or a connection: its activity or weight where `what` is empty; `key` is what that is asked by,
- * `told` what it is called; behind it, in the same axis, `behind`.
- * @typedef {{id: string, what: string, key: string, told: string, behind: string[], data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
+ * `told` what it is called; behind it, in the same axis, `behind`; `names` and `seen` are the names
+ * of all of these, and their ranges.
+ * @typedef {{id: string, what: string, key: string, told: string, behind: string[], names: string[], seen: Seen[], data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
  *   canvas: HTMLCanvasElement, ends: HTMLElement[], pin: HTMLButtonElement, parts: HTMLElement[]}} Strip */
 
 /** What a model with a spike block has, 1 in the steps in which it fires. */
@@ -44,9 +47,11 @@ function element(tag, of) {
 
 /** The strips: first what is pinned, at the end what is held. */
 export class Strips {
-  /** @param {Link} link @param {Attention} attention @param {Scrubber} scrubber @param {HTMLElement} place
-   */
-  constructor(link, attention, scrubber, place) {
+  /** @param {Link} link @param {Attention} attention @param {Scrubber} scrubber @param {Axis} axis
+   * @param {HTMLElement} place @param {HTMLElement} under what is said of where the pointer is */
+  constructor(link, attention, scrubber, axis, place, under) {
+    this.axis = axis;
+    this.under = under;
     this.link = link;
     this.attention = attention;
     this.scrubber = scrubber;
@@ -81,6 +86,8 @@ export class Strips {
       key: '',
       told: '',
       behind: [],
+      names: [],
+      seen: [],
       data: '',
       name,
       choice,
@@ -103,7 +110,9 @@ export class Strips {
       if (strip !== this.held) this.of(this.held, this.attention.groups.get(this.held.id), this.held.what);
       this.list();
     };
+    canvas.onpointerleave = () => this.point(null);
     canvas.onpointerdown = canvas.onpointermove = (/** @type {PointerEvent} */ event) => {
+      this.point(event.offsetX);
       if (event.buttons !== 1 || this.scrubber.scrub.disabled) return;
       canvas.setPointerCapture(event.pointerId);
       this.scrubber.seek(this.scrubber.under(event.offsetX, canvas.clientWidth));
@@ -131,6 +140,28 @@ export class Strips {
     this.list();
   }
 
+  /** Say what all strips show below the pointer. @param {number | null} x pixels across a strip, null where it is on none */
+  point(x) {
+    this.under.hidden = x === null;
+    if (x === null) return;
+    const { clientWidth: width, offsetLeft } = this.held.canvas,
+      step = this.scrubber.under(x, width);
+    const lines = [...this.pinned, this.held].flatMap(({ names, seen }) =>
+      seen.map(({ trace, first, every }, at) => {
+        const bin = Math.floor((step - first) / every),
+          [least, most] = [trace[2 * bin], trace[2 * bin + 1]];
+        return least <= most
+          ? `${names[at]}  ${signed(rounded(least))}${most > least ? ` … ${signed(rounded(most))}` : ''}`
+          : '';
+      }),
+    );
+    const box = this.under.firstChild ?? this.under.appendChild(document.createElement('div'));
+    box.textContent = [this.axis.words(step), ...lines.filter(Boolean)].join('\n');
+    const at = THUMB + this.scrubber.across(step) * (width - 2 * THUMB);
+    this.under.classList.toggle('late', at > width / 2);
+    this.under.style.transform = `translateX(${(offsetLeft + at).toFixed(1)}px)`;
+  }
+
   /** Say what a strip is of. @param {Strip} strip @param {Group | undefined} group @param {string} [what] the name of what it
    * shows, where there is that @param {Curve} [curve] what is behind that, from its second signal on */
   of(strip, group, what = '', curve = { items: [], names: [] }) {
@@ -144,6 +175,7 @@ export class Strips {
     strip.key = strip.what ? `${strip.id}.${strip.what}` : strip.id;
     strip.told = strip.what === RASTER ? `the group of ${called}` : strip.what ? `${called}, ${strip.what}` : called;
     strip.behind = curve.items.slice(1);
+    strip.names = [strip.what && strip.what !== RASTER ? `${called}.${strip.what}` : called, ...curve.names.slice(1)];
     if (strip.behind.length) strip.told = curve.names.join(' and ');
     const again = !isPinned && this.pinned.some(({ key }) => key === strip.key);
     const first = group?.data.neuron === undefined ? 'weight' : (group.data.state ?? 'activity');
@@ -173,6 +205,7 @@ export class Strips {
   clear(strip) {
     for (const part of [strip.value, ...strip.ends]) part.textContent = '';
     strip.canvas.width = 0;
+    strip.seen = [];
     this.asked = '';
   }
 
@@ -347,6 +380,7 @@ export class Strips {
    * trace itself shows that; behind it, wide and pale, others. @param {Strip} strip @param {Float32Array} trace
    * @param {Traces} traces @param {Float32Array[]} behind @param {Float32Array} [spikes] */
   paint(strip, trace, { first, every }, behind, spikes) {
+    strip.seen = [trace, ...behind].map((one) => ({ trace: one, first, every }));
     const { canvas } = strip,
       [context, x] = this.blank(canvas);
     const { clientWidth: width, clientHeight: height } = canvas,
@@ -432,6 +466,11 @@ function follow(context, trace, x, y) {
     } else before = NaN;
   }
   context.stroke();
+}
+
+/** A number as well as 32 bits hold it. @param {number} value @returns {number} */
+function rounded(value) {
+  return Number(value.toPrecision(4));
 }
 
 /** A number in little room. @param {number} value @returns {string} */
