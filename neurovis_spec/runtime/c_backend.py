@@ -31,7 +31,7 @@ from neurovis_spec.language.expressions.functions import Library
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.runtime import c_flows, c_functions, c_library, c_once, c_plan
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
-from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, state_name, words_of
+from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function_of_arrays, state_name, words_of
 from neurovis_spec.runtime.c_step import Built, StepCode, begins_otherwise, is_watched
 from neurovis_spec.runtime.kept_once import Once, kept_once
 from neurovis_spec.runtime.lags import ring_lengths
@@ -270,10 +270,10 @@ def _write(network: Network, layout: SignalLayout) -> Written:
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
         elif type_ == "int64_t" and not there[only]:
             code.line("return 0;")
-        head = f"static {type_} {name}(const nv_state *p{parameters})"
         pointers = _pointer_lines(network, of.plan, once)
-        named = {name: line for name, line in pointers.items() if f"*restrict {name}" not in parameters}
-        bodies += [*function(code, head, named | tables.pointer_lines()), ""]
+        named = {array: line for array, line in pointers.items() if f"*restrict {array}" not in parameters}
+        handed = named | tables.pointer_lines()
+        bodies += [*function_of_arrays(code, type_, name, f"const nv_state *p{parameters}", handed), ""]
     used, flags = words_of(bodies), {"FUSED": there["fused"], "ONCE": there["once"], "PACKED": packed}
     flags["BEFORE"] = bool(whole.fuses.any())
     parts = [

@@ -78,7 +78,7 @@ class Tables:
             name = self._names[key] = f"t{len(self._names)}"
             if self._longest is not None and len(array) > self._longest:
                 item = f"p->given[{len(self.passed_in)}]"
-                self._pointer_lines[name] = f"const {kind} *const {name} = (const {kind} *){item};"
+                self._pointer_lines[name] = f"const {kind} *restrict const {name} = (const {kind} *){item};"
                 self.passed_in.append(array)
             else:
                 self._text[name] = f"static const {kind} {name}[{len(array)}] = {{\n{self._items(array)}\n}};"
@@ -277,17 +277,33 @@ def words_of(lines: Iterable[str]) -> set[str]:
 def function(code: Code, head: str, pointer_lines: Mapping[str, str]) -> list[str]:
     """A function of the lines of ``code``. Before them stand the lines of ``pointer_lines``, which name the arrays, and
     those of ``code.head``, as far as they are used."""
-    head_lines = dict(code.head)
-    used = words_of(code.lines)
-    for name in reversed(list(head_lines)):  # last first: a line at the head may read those before it
-        if name in used:
-            used |= words_of([head_lines[name]])
-    heads = [f"    {line}" for name, line in head_lines.items() if name in used]
+    pointers, heads = _used_lines(code, pointer_lines)
+    return [head, "{", *(f"    {line}" for line in (*pointers, *heads)), *code.lines, "}"]
+
+
+def function_of_arrays(
+    code: Code, type_: str, name: str, parameters: str, pointer_lines: Mapping[str, str]
+) -> list[str]:
+    """The same of a function of these ``parameters``, which it hands over to one that has the arrays as parameters,
+    too: of pointers that are none compilers do not believe that they are ``restrict``."""
+    pointers, heads = _used_lines(code, pointer_lines)
+    declared = [line.removesuffix(";").partition(" = ") for line in pointers]
+    given = [one.split()[-1].lstrip("*") for one in parameters.split(", ")]
+    inner = ", ".join([parameters, *(declaration for declaration, _, _ in declared)])
+    handed = ", ".join([*given, *(value for _, _, value in declared)])
     return [
-        head,
-        "{",
-        *(f"    {line}" for name, line in pointer_lines.items() if name in used),
-        *heads,
-        *code.lines,
+        *(f"static inline {type_} {name}_of({inner})", "{", *(f"    {line}" for line in heads), *code.lines, "}", ""),
+        *(f"static {type_} {name}({parameters})", "{"),
+        f"    {'' if type_ == 'void' else 'return '}{name}_of({handed});",
         "}",
     ]
+
+
+def _used_lines(code: Code, pointer_lines: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """Those of ``pointer_lines`` and of ``code.head`` that are used."""
+    used = words_of(code.lines)
+    for name in reversed(list(code.head)):  # last first: a line at the head may read those before it
+        if name in used:
+            used |= words_of([code.head[name]])
+    pointers, heads = ([line for name, line in lines.items() if name in used] for lines in (pointer_lines, code.head))
+    return pointers, heads

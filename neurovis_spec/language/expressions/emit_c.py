@@ -15,7 +15,7 @@ from typing import ClassVar, Final, TypeAlias
 
 from neurovis_spec.language.expressions.emit import Code, Writer, called, simplify, with_values
 from neurovis_spec.language.expressions.functions import FUNCTIONS, OPERATORS, Operation
-from neurovis_spec.language.expressions.tree import Call, Chain, Conditional, Draw, Name, Number, Tree
+from neurovis_spec.language.expressions.tree import Binary, Call, Chain, Conditional, Draw, Name, Number, Tree
 
 #: What a name may be: a number, or code.
 Value: TypeAlias = float | str
@@ -25,6 +25,9 @@ Drawn: TypeAlias = Callable[[Draw, Value, Value], Value]
 
 _CHOICE, _OR, _AND, _EQUAL, _COMPARE, _ADD, _MULTIPLY, _SIGN, _ATOM = range(9)
 _NONE: Mapping[str, Made] = MappingProxyType({})
+
+#: Operators that cost more than a jump.
+_COSTLY: Final = frozenset(("/", "%", "^"))
 
 #: Functions of C's library whose results a compiler must not work out itself: it rounds better than the library. The
 #: arcs stand behind the others in the files that are exported.
@@ -57,13 +60,16 @@ _OF_OPERATORS: Final = {
 {{
     return x * x;
 }}""",
-    # whether 16 numbers are all 0, whatever their signs
+    # whether 16 numbers are all 0 by their bits
     "nv_quiet": """static int nv_quiet(const {real} *values)
 {{
-    int count = 0;
-    for (int i = 0; i < 16; i++)
-        count += values[i] != 0.0{s};
-    return !count;
+    uint64_t any = 0;
+    for (size_t at = 0; at < 16*sizeof(values[0]); at += 8) {{
+        uint64_t bits;
+        memcpy(&bits, (const char *)values + at, 8);
+        any |= bits;
+    }}
+    return !any;
 }}""",
     # of a ring of slots, that of so many steps before now, or of one more where q is below 0; and the next one
     "nv_slot": """static int32_t nv_slot(int32_t now, int32_t ago, int32_t length, {real} q)
@@ -136,7 +142,7 @@ class Emitter:
         >>> c.value(parse("w + 2 * rate * pre * (target - post)"), names)
         'w + 1.0*a[1]*(s - y)'
         >>> c.value(parse("x^2 if x < 0 or c else tanh(x)"), {"x": "a", "c": "p"})
-        'a < 0.0 || p != 0.0 ? nv_square(a) : tanh(a)'
+        '(a < 0.0) | (p != 0.0) ? nv_square(a) : tanh(a)'
         """
         if calls or drawn is not None:
             tree, names = self._called(tree, dict(names), calls, drawn)
@@ -190,6 +196,7 @@ class _C(Writer):
     }
     compared: ClassVar[int] = _ADD
     joined: ClassVar[Mapping[str, int]] = {"or": _EQUAL, "and": _EQUAL}  # compilers warn of && within ||
+    both: ClassVar[Mapping[str, str]] = {"or": "|", "and": "&"}
     signed: ClassVar[int] = _ATOM
 
     def __init__(self, emitter: Emitter, names: Mapping[str, Value]) -> None:
@@ -213,6 +220,13 @@ class _C(Writer):
 
     def negation(self, operand: Tree) -> Code:
         return Code(f"!{self.truth(operand).within(_ATOM)}", _SIGN, True)
+
+    def logic(self, node: Chain) -> Code:
+        """Of truths that cost no more than a jump all are worked out: of a jump compilers make no vectors."""
+        if not all(map(_is_cheap, node.operands[1:])):
+            return super().logic(node)
+        operands = [self.truth(operand).within(_ATOM) for operand in node.operands]
+        return Code(f" {self.both[node.operators[0]]} ".join(operands), _OR, True)
 
     def square(self, base: Tree) -> Code:
         return Code(f"nv_square({self.loose(base)})", _ATOM)
@@ -241,6 +255,15 @@ class _C(Writer):
 
     def draw(self, node: Draw) -> Code:
         raise ValueError("this expression draws, and no code to draw was given")
+
+
+def _is_cheap(tree: Tree) -> bool:
+    """Whether there are only names, numbers, comparisons, choices, sums and products in it."""
+    if isinstance(tree, Chain):
+        costs = not _COSTLY.isdisjoint(tree.operators)
+    else:
+        costs = isinstance(tree, Call | Draw) or (isinstance(tree, Binary) and tree.operator in _COSTLY)
+    return not costs and all(map(_is_cheap, tree.parts))
 
 
 def _is_zero(tree: Tree) -> bool:
