@@ -115,7 +115,11 @@ class _Reader:
         if isinstance(node, SourceMapping):
             if path[-1:] not in (("edges",), ("spikes",)) and node.get("file") is not None and _has_columns(node):
                 return self._inline(node, folder)
-            if path and path[-1] in ("matrix", "centre", "position") and node.get("file") is not None:
+            is_matrix = path[-1:] in (("matrix",), ("centre",), ("position",)) or path[-2:-1] in (
+                ("matrices",),
+                ("set",),
+            )
+            if is_matrix and node.get("file") is not None:
                 return self._table(node, folder)
             if path and path[-1] == "edges" and node.get("file") is not None:
                 return self._edges(node, folder)

@@ -42,6 +42,7 @@ def folder(tmp_path: Path) -> Path:
     data.mkdir()
     np.savetxt(data / "sensed.csv", [[0.5], [0.25]], delimiter=",")
     (data / "spikes.csv").write_text("time,index,t_ms,id\n0.001,1,1,1\n")
+    np.savetxt(data / "pairs.csv", [[0, 0.5], [-0.5, 0]], delimiter=",")
     np.savetxt(data / "centres.csv", np.eye(2, 4), delimiter=",")
     np.savez_compressed(data / "trained.npz", weights=np.ones((2, 4)), bias=np.zeros(4))
     (data / "feedback.mtx").write_text("%%MatrixMarket matrix coordinate pattern general\n4 2 2\n1 1\n4 2\n")

@@ -6,6 +6,7 @@ the sections of a spec that say what there is, and none that says how it is run,
 
 from __future__ import annotations
 
+from collections.abc import Container
 from collections.abc import Mapping as AnyMapping
 from typing import Annotated, ClassVar
 
@@ -13,10 +14,10 @@ from pydantic import Field
 
 from neurovis_spec.language.drawing import ModuleLayoutModel
 from neurovis_spec.language.grammar import GROUP, declaring, naming
-from neurovis_spec.language.located import FormulaField, IdentifierField, MeasuredField, TextField
+from neurovis_spec.language.located import Formula, FormulaField, IdentifierField, Located, TextField
 from neurovis_spec.language.model import Model, Named
 from neurovis_spec.language.sections import ConnectionsField, GroupsField, InputsField, ListedNamesField
-from neurovis_spec.language.values import ParametersField
+from neurovis_spec.language.values import GivenField, ParametersField, WrittenField
 
 #: the sections of an included file
 INCLUDED = ("modules", "activations", "models", "rules", "synapses")
@@ -40,14 +41,21 @@ class InstanceModel(Model):
     names: Annotated[ListedNamesField, declaring("instance")] | None = Field(
         None, description="The names of the instances, one by one, or {file: …, column: …}."
     )
-    set: Annotated[Named[Annotated[MeasuredField, GROUP]], naming("parameter")] = Field(
-        default_factory=dict, description="{parameter of the module: value}; may use i (0-based) and n (count)."
+    set: Annotated[Named[Annotated[GivenField, GROUP]], naming("parameter")] = Field(
+        default_factory=dict,
+        description="{parameter of the module: value}; may use i (0-based) and n (count). {matrix of it: rows}, or "
+        "{file: …}, or a matrix out here.",
     )
     inputs: Annotated[Named[Annotated[TextField, naming("input")]], naming("input")] = Field(
         default_factory=dict,
         description="{input of the module: input out here}; one of count × size is shared out in order.",
     )
     description: TextField | None = Field(None, description="What it is.")
+
+    def formulas(self, matrices: Container[str]) -> dict[str, Formula]:
+        """What it sets but for the ``matrices`` of its module, as far as that is formulas."""
+        given = self.set.items()
+        return {name: value for name, value in given if isinstance(value, Located) and name not in matrices}
 
 
 InstancesField = Annotated[Named[InstanceModel], declaring("instance")]
@@ -62,6 +70,10 @@ class ModuleModel(Model):
     description: TextField | None = Field(None, description="What this is.")
     parameters: ParametersField = Field(
         default_factory=dict, description="Constants of its own, in order; an instance may set them."
+    )
+    matrices: Named[WrittenField] = Field(
+        default_factory=dict,
+        description="Matrices that its connections name: {name: rows}, {name: {file: …}}; an instance may set others.",
     )
     inputs: InputsField = Field(
         default_factory=dict,

@@ -40,6 +40,7 @@ from neurovis_spec.language.grammar import (
 )
 from neurovis_spec.language.keys import Keys, Words, read_keys
 from neurovis_spec.language.located import (
+    IDENTIFIER,
     NAME,
     Formula,
     FormulaField,
@@ -184,10 +185,32 @@ class MatrixRows(NamedTuple):
         return self.node.span
 
 
-Matrix: TypeAlias = MatrixRows | FileReference
+#: A matrix as it is written.
+Written: TypeAlias = MatrixRows | FileReference
+
+
+class MatrixName(NamedTuple):
+    """A matrix of a module, by its name."""
+
+    name: Located[str]
+
+    @property
+    def span(self) -> Span:
+        """Where it is named."""
+        return self.name.span
+
+
+Matrix: TypeAlias = Written | MatrixName
 
 
 def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
+    """A list of rows, a file, or the name of a matrix of the module."""
+    if isinstance(node, Scalar) and isinstance(node.value, str) and IDENTIFIER.fullmatch(node.value):
+        return MatrixName(Located(node.value, node))
+    return as_written(node, info)
+
+
+def as_written(node: Node, info: ValidationInfo) -> Written:
     """A list of rows, or a file."""
     if isinstance(node, Mapping):
         return as_file(node, info)
@@ -202,21 +225,32 @@ def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
 
 _ROWS: Final = ListOf(ListOf(CELL_OF_ROWS))
 
-MatrixField = Annotated[Matrix, Leaf(as_matrix, Either((_ROWS, FILE)))]
+_MATRIX: Final = Either((_ROWS, FILE, NAME))
+MatrixField = Annotated[Matrix, Leaf(as_matrix, _MATRIX)]
+#: One that a module declares.
+WrittenField = Annotated[Written, Leaf(as_written, Either((_ROWS, FILE)))]
 
 
-def as_centre(node: Node, info: ValidationInfo) -> Formula | Matrix:
+def as_given(node: Node, info: ValidationInfo) -> Formula | Written:
+    """What an instance sets: a number or an expression of a parameter, or a matrix."""
+    return as_measured(node, info) if isinstance(node, Scalar) else as_written(node, info)
+
+
+GivenField = Annotated[Formula | Written, Leaf(as_given, Either((FORMULA, _ROWS, FILE)), True)]
+
+
+def as_centre(node: Node, info: ValidationInfo) -> Formula | Written:
     """Like a weight or like a matrix."""
-    return as_formula(node, info) if isinstance(node, Scalar) else as_matrix(node, info)
+    return as_formula(node, info) if isinstance(node, Scalar) else as_written(node, info)
 
 
-CentreField = Annotated[Formula | Matrix, Leaf(as_centre, Either((FORMULA, _ROWS, FILE)))]
+CentreField = Annotated[Formula | Written, Leaf(as_centre, Either((FORMULA, _ROWS, FILE)))]
 
-_DELAYS: Final = Map({"matrix": Key(Either((_ROWS, FILE)), "The delay of each pair, sources as rows.")}, one=True)
+_DELAYS: Final = Map({"matrix": Key(_MATRIX, "The delay of each pair, sources as rows.")}, one=True)
 _DELAY: Final = Map(
     {
         "seconds": Key(Either((FORMULA, _DELAYS)), "The delay in seconds, as an expression or {matrix: …}."),
-        "matrix": Key(Either((_ROWS, FILE)), "The delay of each pair in steps, sources as rows."),
+        "matrix": Key(_MATRIX, "The delay of each pair in steps, sources as rows."),
     },
     one=True,
 )

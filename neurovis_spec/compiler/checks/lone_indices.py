@@ -45,7 +45,9 @@ def check_lone_indices(compiled: Compiled, findings: Findings) -> None:
 def _instances(section: Section, findings: Findings) -> None:
     for name, model in section.instances.items():
         if model.count is None and model.names is None:
-            for place, index in _occurrences(formulas_of(model, COUNTED), COUNTED):
+            given = model.formulas(())  # in a matrix they count its rows and columns
+            formulas = (one for one in formulas_of(model, COUNTED) if one.path[0] != "set" or one.path[1] in given)
+            for place, index in _occurrences(formulas, COUNTED):
                 hint = "'i' and 'n' count the instances of an entry; give it a 'count'"
                 _warn(place, index, f"'{name}' is one instance", hint, findings)
 

@@ -36,7 +36,7 @@ from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale,
 from neurovis_spec.compiler.events.settable import Assembled, Part
 from neurovis_spec.compiler.limits import PAIRS_A_CONNECTION, Limits, amount
 from neurovis_spec.compiler.names.references import Directory
-from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.names.scope import GivenMatrix, Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
 from neurovis_spec.compiler.neurons.labels import check_length
 from neurovis_spec.compiler.neurons.populate import Census
@@ -45,7 +45,7 @@ from neurovis_spec.compiler.values.arguments import Each, Settled, check_initial
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.matrices import Grid, draws_any, grid_of
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.tree import draws, names
 from neurovis_spec.language.grammar import WHICH
 from neurovis_spec.language.located import Formula, Located
@@ -54,9 +54,10 @@ from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.tables import EdgeFile, EdgeTexts, FileReference, columns_of_edges, edge_column
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
-from neurovis_spec.language.values import Delay, MatrixRows, Tie
+from neurovis_spec.language.values import Delay, Matrix, MatrixName, MatrixRows, Tie
 from neurovis_spec.language.words import Combine
 from neurovis_spec.language.yaml.source import Mapping, Scalar
+from neurovis_spec.likeness import suggest
 
 #: Keys of a body that say which connections there are.
 _SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self", "where"})
@@ -419,12 +420,35 @@ class EntryBuilder:
             least = max(least - len(sources), 0) // 2
         return self._fits(least)
 
-    def _grid(self, matrix: MatrixRows | FileReference, purpose: str) -> Grid | Unknown:
-        """A matrix of this entry, sources as rows; UNKNOWN where it is invalid."""
+    def _given(self, matrix: Matrix) -> GivenMatrix | Unknown:
+        """A matrix as it is written, here or, where it is one of the module, there or where it is set."""
+        scope = self.context.scope
+        if not isinstance(matrix, MatrixName):
+            return GivenMatrix(matrix, self.constants, scope.files)
+        found, name = scope.matrices.get(matrix.name.value), matrix.name.value
+        if found is not None:
+            return found
+        hint = suggest(name, scope.matrices, "matrices of the module") if scope.matrices else None
+        hint = hint or "write rows, [[1, 2], [3, 4]], or {file: …}; a module may declare 'matrices'"
+        self.constants.findings.error("unknown-matrix", matrix.span, f"there is no matrix '{shorten(name)}'", hint)
+        return UNKNOWN
+
+    def _grid(self, matrix: Matrix, purpose: str) -> Grid | Unknown:
+        """A matrix of this entry, sources as rows; UNKNOWN where it is invalid. The structure depends on what formulas
+        read in one that is set from around the module."""
         by_target = self.body.rows is not None and self.body.rows.value == "to"
         n = UNKNOWN if self.sources is UNKNOWN or not self._is_sound("rows") else len(self.sources)
         m = UNKNOWN if self.targets is UNKNOWN or not self._is_sound("rows") else len(self.targets)
-        return grid_of(matrix, n, m, by_target, self.constants, self.context.scope.files, self._stream(purpose))
+        given = self._given(matrix)
+        if given is UNKNOWN:
+            return UNKNOWN
+        written, constants, files = given
+        if constants is self.constants:
+            return grid_of(written, n, m, by_target, constants, files, self._stream(purpose))
+        with constants.following() as parts:
+            grid = grid_of(written, n, m, by_target, constants, files, self._stream(purpose))
+        constants.depend_on(parts)
+        return grid
 
     def _parts_per_connection(
         self, grid: Grid | Unknown | None, parts: list[Part], shape: _Shape | Unknown
@@ -614,7 +638,8 @@ class EntryBuilder:
             self.formulas.go_by(names(tree))
             values = self._values(written.value, shape, "delay")
         else:
-            grid, drawn = self._grid(written.value, "delay"), draws_any(written.value)
+            given = self._given(written.value)
+            grid, drawn = self._grid(written.value, "delay"), given is not UNKNOWN and draws_any(given.written)
             values = UNKNOWN if grid is UNKNOWN or shape is UNKNOWN else grid.values[shape.i, shape.j]
         if values is UNKNOWN or shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
             return UNKNOWN

@@ -11,7 +11,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits
@@ -19,7 +20,7 @@ from neurovis_spec.compiler.names.input_bindings import InputBinding, bindings_o
 from neurovis_spec.compiler.names.listed import listed_names
 from neurovis_spec.compiler.names.modules import Library, Module
 from neurovis_spec.compiler.names.references import Section, home_of, key_of, key_span
-from neurovis_spec.compiler.names.scope import Expansion, Scope
+from neurovis_spec.compiler.names.scope import Expansion, GivenMatrix, Scope
 from neurovis_spec.compiler.names.size_estimate import SizeEstimate
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.neurons.inputs import make_input
@@ -28,9 +29,9 @@ from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Findings, Undeclared, shorten
 from neurovis_spec.language.expressions.tree import Number, names, substitute
-from neurovis_spec.language.located import NAME_RULE, in_unit, too_long
+from neurovis_spec.language.located import NAME_RULE, Formula, Located, in_unit, too_long
 from neurovis_spec.language.model import names_of, unread
-from neurovis_spec.language.modules import InstanceModel
+from neurovis_spec.language.modules import InstanceModel, ModuleModel
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.tables import TableColumn
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
@@ -55,6 +56,14 @@ class _Place:
     number: int
     position: int
     count: int
+
+
+class _Given(NamedTuple):
+    """What an instance gives its module: inputs; parameters, with the names that are read for each; matrices."""
+
+    inputs: Mapping[str, InputBinding] = MappingProxyType({})
+    settings: Mapping[str, frozenset[str]] = MappingProxyType({})
+    matrices: Mapping[str, GivenMatrix | Unknown] = MappingProxyType({})
 
 
 class _StoppedError(Exception):
@@ -113,16 +122,15 @@ class Expander:
         folder: Path,
         place: _Place,
         ancestors: tuple[int, ...],
-        bound: Mapping[str, InputBinding] | None = None,
+        given: _Given | None = None,
         module: str | None = None,
-        settings: Mapping[str, frozenset[str]] | None = None,
     ) -> int:
         """Make one scope and those within it. ``ancestors`` are the indices of the scopes around it, the spec
-        first, ``bound`` the inputs that are given to it. Returns the index of the scope."""
+        first. Returns the index of the scope."""
         index = len(self.scopes)
         self.scopes.append(None)
-        files = self.files_in(folder)
-        inputs = self._inputs(section, constants, files, place, bound or {})
+        files, given = self.files_in(folder), given or _Given()
+        inputs = self._inputs(section, constants, files, place, given.inputs)
         scope = Scope(
             path=place.path,
             section=section,
@@ -135,7 +143,8 @@ class Expander:
             parent=ancestors[-1] if ancestors else -1,
             declared=place.declared,
             number=place.number,
-            settings=settings or {},
+            settings=given.settings,
+            matrices=self._matrices(section, constants, files, given.matrices),
         )
         self.scopes[index] = scope
         if not ancestors:
@@ -222,7 +231,7 @@ class Expander:
         module = self._module(model)
         count = None if model.count is None else scope.constants.integer(model.count, "'count'", 1)
         if module is UNKNOWN or count is UNKNOWN or not model.unknown.isdisjoint(("count", "names")):
-            for formula in model.set.values():
+            for formula in model.formulas(()).values():
                 scope.constants.value(formula, dict.fromkeys(COUNTED, UNKNOWN))
             bindings_of(model, scope, self.findings)
             return {name: UNKNOWN}
@@ -237,21 +246,60 @@ class Expander:
         single = count is None and model.names is None
         self.used.add(module.name)
         self._check_keys(model, module)
-        bound = bindings_of(model, scope, self.findings)
+        bound, matrices = bindings_of(model, scope, self.findings), self._set_matrices(model, module, scope)
         result: dict[str, tuple[int, ...]] = {}
         for position, instance_name in enumerate(instance_names):
             number = 0 if single else position + 1
             place = _Place(scope.called(instance_name), scope.called(name), number, position, len(instance_names))
             constants, settings = self._constants(model, module, scope, place)
-            index = self._make_scope(
-                module.model, constants, module.folder, place, ancestors, bound, module=module.name, settings=settings
-            )
+            given = _Given(bound, settings, matrices)
+            index = self._make_scope(module.model, constants, module.folder, place, ancestors, given, module.name)
             result[instance_name] = (index,)
         for binding in bound.values():
             check_sizes(binding, instance_names, self.findings)
         if not single:
             result[name] = tuple(result[instance_name][0] for instance_name in instance_names)
         return result
+
+    def _matrices(
+        self, section: Section, constants: Constants, files: Files, given: Mapping[str, GivenMatrix | Unknown]
+    ) -> Names[GivenMatrix]:
+        """The matrices of a scope by their names: those that are given, the others as they are written."""
+        if not isinstance(section, ModuleModel):
+            return Names()
+        for name in section.matrices:
+            if name in section.parameters:
+                span = key_of(section.source, "matrices", name).span
+                message = f"'{name}' is a parameter of this module, and a matrix"
+                self.findings.error("duplicate-name", span, message, "rename one of them")
+        own = {name: GivenMatrix(written, constants, files) for name, written in section.matrices.items()}
+        return names_of(section, "matrices", {**own, **given})
+
+    def _set_matrices(self, model: InstanceModel, module: Module, scope: Scope) -> dict[str, GivenMatrix | Unknown]:
+        """The matrices that an instance sets: rows, files, or matrices of the scope around it. A finding for what is
+        no matrix, or no parameter."""
+        found: dict[str, GivenMatrix | Unknown] = {}
+        known = names_of(module.model, "matrices", module.model.matrices)
+        for name, value in model.set.items():
+            if isinstance(value, Located):
+                if name in known:
+                    found[name] = self._matrix_around(value, module, name, scope)
+            elif name in known:
+                found[name] = GivenMatrix(value, scope.constants, scope.files)
+            elif name in module.model.parameters:
+                message = f"'{name}' of the module '{module.name}' is a number, and this a matrix"
+                self.findings.error("wrong-type", value.span, message, "matrices stand under 'matrices' of a module")
+        return {**found, **{name: UNKNOWN for name in unread(model, "set") if name in known}}
+
+    def _matrix_around(self, named: Formula, module: Module, name: str, scope: Scope) -> GivenMatrix | Unknown:
+        """A matrix of the scope around an instance, by its name."""
+        matrix = scope.matrices.get(str(named.value))
+        if matrix is not None:
+            return matrix
+        message = f"'{name}' of the module '{module.name}' is a matrix"
+        hint = suggest(str(named.value), scope.matrices, "matrices out here") if scope.matrices else None
+        self.findings.error("wrong-type", named.span, message, hint or "write rows, [[1, 2], [3, 4]], or {file: …}")
+        return UNKNOWN
 
     def _instance_names(
         self, name: str, model: InstanceModel, count: int | None, scope: Scope
@@ -289,8 +337,9 @@ class Expander:
     def _check_keys(self, model: InstanceModel, module: Module) -> None:
         """What ``set`` and ``inputs`` name must be the module's."""
         inner = module.model
+        matrices = names_of(inner, "matrices", inner.matrices)
         parts: tuple[tuple[str, Mapping[str, object], str, Collection[str]], ...] = (
-            ("set", model.set, "parameter", names_of(inner, "parameters", inner.parameters)),
+            ("set", model.set, "parameter", names_of(inner, "parameters", inner.parameters).over(matrices)),
             ("inputs", model.inputs, "input", names_of(inner, "inputs", inner.inputs)),
         )
         for part, given, what, known in parts:
@@ -313,7 +362,8 @@ class Expander:
         given: dict[str, float] = {}
         following_settings: dict[str, ParameterFormula] = {}
         names_read: dict[str, frozenset[str]] = {}
-        for name, written in model.set.items():
+        formulas = model.formulas(module.model.matrices)
+        for name, written in formulas.items():
             parameter = module.model.parameters.get(name)
             formula = in_unit(written, "" if parameter is None else parameter.measure, self.findings)
             value = scope.constants.value(formula, extra)
@@ -329,7 +379,7 @@ class Expander:
                 following_settings[name] = outer.bound(tree, extra)
         constants.settings = following_settings
         constants.names.declared.update(unread(model, "set"))
-        places = {name: formula.span for name, formula in model.set.items()}
+        places = {name: formula.span for name, formula in formulas.items()}
         make_parameters(module.model, constants, given, places)
         return constants, names_read
 

@@ -17,6 +17,16 @@ from neurovis_spec.compiler.values.definitions import Definitions
 from neurovis_spec.diagnostics import Undeclared
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
+from neurovis_spec.language.values import Written
+
+
+class GivenMatrix(NamedTuple):
+    """A matrix of a module, as it is written there or where an instance sets it, and what its formulas and its path
+    mean at that place."""
+
+    written: Written
+    constants: Constants
+    files: Files
 
 
 @dataclass(frozen=True)
@@ -25,7 +35,8 @@ class Scope:
 
     ``inputs`` are those that its names may mean, those of instances within it by their dotted names. ``children`` are
     the places of the instances within it, by name: ``left`` means all of a counted one, ``left1`` the first of them.
-    ``settings`` are the parameters that ``set`` gives, each with the names that its formula uses in the scope around.
+    ``settings`` are the parameters that ``set`` gives, each with the names that its formula uses in the scope around;
+    ``matrices`` those of the module, as they are there or as ``set`` gives them.
     """
 
     path: str
@@ -40,6 +51,7 @@ class Scope:
     number: int = 0
     children: Names[tuple[int, ...]] = field(default_factory=Names)
     settings: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    matrices: Names[GivenMatrix] = field(default_factory=Names)
 
     def input(self, name: str) -> Input | Unknown | None:
         """The input that is called so, here or in an instance; None where there is none."""

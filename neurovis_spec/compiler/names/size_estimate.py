@@ -147,7 +147,7 @@ class SizeEstimate:
             around = {key: value[scopes] for key, value in known.items()}
             around |= {"i": np.arange(len(scopes)) - first[scopes], "n": counts[scopes]}
             given: dict[str, FloatArray] = {}
-            for key, formula in model.set.items():
+            for key, formula in model.formulas(self._modules[module].model.matrices).items():
                 value = constants.unchecked(formula, around)
                 given[key] = np.broadcast_to(np.nan if value is UNKNOWN else value, scopes.shape)
             yield _Entered(module, len(scopes), given)

@@ -20,7 +20,7 @@ from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.functions import DRAWS
 from neurovis_spec.language.tables import FileReference
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
-from neurovis_spec.language.values import Matrix, MatrixRows
+from neurovis_spec.language.values import MatrixRows, Written
 from neurovis_spec.language.yaml.source import NULL
 
 
@@ -41,14 +41,14 @@ class Grid(NamedTuple):
         return Grid(self.values.T, self.present.T, self.span)
 
 
-def draws_any(matrix: Matrix) -> bool:
+def draws_any(matrix: Written) -> bool:
     """Whether a formula in any cell draws."""
     cells = UNKNOWN if isinstance(matrix, FileReference) else cells_of(matrix.node, Findings(), "")
     return cells is not UNKNOWN and any(f"{name}(" in text.replace(" ", "") for name in DRAWS for text in cells.texts)
 
 
 def grid_of(
-    matrix: Matrix,
+    matrix: Written,
     n: int | Unknown,
     m: int | Unknown,
     by_target: bool,
