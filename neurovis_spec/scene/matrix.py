@@ -1,4 +1,4 @@
-"""Matrix: source × target as coloured cells, in the order of the layout, groups and modules marked.
+"""Matrix: source × target as coloured cells, groups and modules in the order of the spec, and marked.
 
 In: a network, positions, the weights of each frame. Out: a Part. A row is what a neuron sends, a column what one takes
 in; where there is no connection there is no cell. Cells that change are shapes of their own; of many that stay an image
@@ -52,26 +52,26 @@ class Order:
 
 
 def order_of(network: Network, layout: Layout, wanted: Sequence[int]) -> Order:
-    """Neurons in the order of the layout: along its direction, then across; what belongs together stays together, and
-    stands where its middle is. The neurons of a group that are in no line (a ring, a grid) are in their own order."""
+    """Groups and instances in the order of the spec, the neurons of a group in that of the layout: along its direction,
+    then across; those that are in no line (a ring, a grid) in their own."""
     direction, names = network.layout.direction, network.neurons.names
     sign = -1.0 if direction in ("up", "left") else 1.0
     group_of = {index: group.name for group in network.neurons.groups for index in group.indices}
     paths = {index: tuple(_ways(group_of[index])) for index in wanted}
     at: dict[int, tuple[float, float]] = {}
-    of_path: dict[str, list[tuple[float, float]]] = {}
-    for index in wanted:
+    of_group: dict[str, list[tuple[float, float]]] = {}
+    first: dict[str, int] = {}
+    for index in sorted(wanted):
         x, y = layout.positions[names[index]]
         at[index] = (sign * y, x) if direction in ("down", "up") else (sign * x, y)
+        of_group.setdefault(group_of[index], []).append(at[index])
         for path in paths[index]:
-            of_path.setdefault(path, []).append(at[index])
-    lines = {name for name, places in of_path.items() if np.ptp(places, axis=0).min() < _LINED}
-    middles = {path: tuple(np.mean(places, axis=0).round(3).tolist()) for path, places in of_path.items()}
+            first.setdefault(path, index)
+    lines = {name for name, places in of_group.items() if np.ptp(places, axis=0).min() < _LINED}
 
-    def key(index: int) -> list[tuple[float, float, str, int]]:
-        outer = [(*middles[path], path, 0) for path in paths[index]]
+    def key(index: int) -> tuple[list[int], tuple[float, float], int]:
         own = at[index] if group_of[index] in lines else (0.0, 0.0)
-        return [*outer, (*own, "", index)]
+        return [first[path] for path in paths[index]], own, index
 
     ordered = sorted(wanted, key=key)
     depth = max((len(path) for path in paths.values()), default=0)
