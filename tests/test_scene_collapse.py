@@ -199,6 +199,18 @@ def test_instances_that_are_not_collapsed_keep_their_frames_where_all_is_laid_ou
     assert {"right1", "right3"} <= said
 
 
+def test_a_glyph_says_how_many_neurons_it_holds_however_small_it_is(tmp_path: Path) -> None:
+    groups = "\n".join(f"  G{k}x: {{count: {12 + 300 * (k % 2)}, bias: 1}}" for k in range(12))
+    lines = "\n".join(f"  G{k}x1 -> G{k + 1}x1: 1" for k in range(11))
+    spec = f"neurovis: 1\nname: chain\nneurons:\n{groups}\nconnections:\n{lines}\nrender: {{size: [240, 200]}}\n"
+    network = nv.compile_text(spec)
+    network.render(tmp_path / "x.svg", step=0, view="pathways")
+    found = {name: g for g in ET.parse(tmp_path / "x.svg").iter() if (name := g.get("data-neuron")) is not None}
+    assert len(found) == 12
+    for name, group in found.items():
+        assert f"×{network.network.group_index[name].count}" in words(group)
+
+
 @pytest.mark.parametrize("collapse", [["left", "right"], ["left", "right2"], ["left", "right", "P"]])
 def test_the_plan_of_the_page_holds_where_glyphs_are_laid_out_anew(collapse: list[str]) -> None:
     plan = "right]], plan: [[left1, P, right1], [left2, null, right2]]}"

@@ -20,6 +20,7 @@ from neurovis_spec.scene import encoding, texts
 from neurovis_spec.scene.ends import EndArray, ends_of
 from neurovis_spec.scene.fading import seconds_of, told_times
 from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.labels import COUNT_ROOM, as_count, size_of_count
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Disc, FlatSpline, Group, Point, Scene, Shape, Spline, Text, ended
 from neurovis_spec.scene.pathways import group_of
@@ -37,8 +38,8 @@ CAPTION = "caption"
 _INNER, _WIDTH = 0.87, 0.6
 #: The number beside the label in its sizes: how large it is, and how far below.
 _SMALLER, _BELOW = 0.85, 0.95
-#: Of a glyph whose label does not stand on it, in radii.
-_ALONE = 0.7
+#: Beneath a glyph that is too small for it, and has no label that says it, in page units.
+_BENEATH = 8.5
 #: A quarter of a circle as a cubic spline.
 _QUARTER = 0.5522847498
 
@@ -265,18 +266,21 @@ def _range(low: float, high: float) -> str:
 
 
 def marks_of(planned: Plan, index: int, ink: str) -> tuple[Shape, ...]:
-    """The second ring of a glyph, and how many neurons it stands for."""
+    """The second ring of a glyph, and how many neurons it stands for, unless it is too small and its label says so."""
     (x, y), radius = planned.centres[index], planned.radii[index]
     ring = Spline(circle((x, y), _INNER * radius), planned.theme.ring, _WIDTH * planned.rings[index])
-    label, words = planned.labels[index], f"×{planned.sizes[index]:,}"
+    label, words = planned.labels[index], as_count(planned.sizes[index])
     if label is not None and label.on_disc:
         size, y = _SMALLER * label.size, label.point[1] + _BELOW * label.size
-    else:
-        size = _ALONE * radius
-        y += 0.36 * size
-    if texts.width(words, size) > 1.9 * radius:
+        size *= min(1.0, COUNT_ROOM * radius / texts.width(words, size))
+        return ring, Text((x, y), words, size, ink, "middle", on_disc=True)
+    size = size_of_count(planned.sizes[index], radius / planned.unit) * planned.unit
+    if size:
+        return ring, Text((x, y + 0.36 * size), words, size, ink, "middle", on_disc=True)
+    if label is not None:
         return (ring,)
-    return ring, Text((x, y), words, size, ink, "middle", on_disc=True)
+    size = _BENEATH * planned.unit
+    return ring, Text((x, y + radius + size), words, size, planned.theme.ink, "middle", halo=planned.theme.background)
 
 
 def circle(centre: Point, radius: float) -> tuple[Point, ...]:

@@ -60,6 +60,8 @@ _SMALLEST_NUMBERED = 16.0
 _CUT, _LETTERS = (0.75, 0.5), 3
 #: How much the label of a glyph moves up, for the number beneath it, in its sizes.
 _UP = 0.3
+#: How large the number on a glyph is whose label stands beside it, in radii, and how wide at most.
+_COUNT, COUNT_ROOM = 0.7, 1.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,16 +114,33 @@ class Ground:
         return float(self.radii[index]) * self.scale
 
 
+def as_count(size: int) -> str:
+    """How many neurons a glyph stands for, as a picture says it.
+
+    >>> as_count(1600)
+    '×1,600'
+    """
+    return f"×{size:,}"
+
+
+def size_of_count(count: int, radius: float) -> float:
+    """How large that is on a glyph of this radius, beside which its label stands, in page units; 0 where it could not
+    be read."""
+    size = min(_COUNT * radius, COUNT_ROOM * radius / texts.width(as_count(count), 1.0))
+    return size if size >= TINY else 0.0
+
+
 def labels_of(
     network: Network,
     ground: Ground,
     obstacles: Obstacles,
     hidden: Sequence[bool] = (),
-    numbered: Collection[int] = (),
+    numbered: Mapping[int, int] = MappingProxyType({}),
     sides: Mapping[int, Side] = MappingProxyType({}),
 ) -> list[Label | None]:
-    """A label for every neuron, or None where there is no room for any of it, or it is ``hidden``. The discs of those
-    that are ``numbered`` bear a number as well. On the ``sides`` given there is room kept for labels."""
+    """A label for every neuron, or None where there is no room for any of it, or it is ``hidden``. Those that are
+    ``numbered`` are glyphs of so many neurons, which their discs say, or labels where these are too small. On the
+    ``sides`` given there is room kept for labels."""
     neurons = network.neurons
     parts = parts_of(neurons)
     chosen = [index for index in range(len(neurons)) if not (hidden and hidden[index])]
@@ -146,7 +165,11 @@ def labels_of(
         for index in counted:
             until[index] = latest
     alone = _told_alone(network, ground, chosen)
-    beside = _beside(network, ground, obstacles, chosen, until, sides, alone)
+    words = _whole(network)
+    for index, count in numbered.items():
+        if not size_of_count(count, ground.radius(index)):
+            words[index] = neurons.labels[index], as_count(count)
+    beside = _beside(network, ground, obstacles, words, until, sides, alone, chosen)
     for index in chosen:  # it is easier to read beside a disc than where it has to be very small
         result[index] = beside.get(index) or result[index]
     for index, label in beside.items():
@@ -203,15 +226,16 @@ def _beside(
     network: Network,
     ground: Ground,
     obstacles: Obstacles,
-    chosen: Sequence[int],
+    words: Sequence[tuple[str, str]],
     until: Sequence[float],
     sides: Mapping[int, Side],
     alone: frozenset[int],
+    chosen: Sequence[int],
 ) -> dict[int, Label]:
-    """Labels beside discs, by neuron, as far as there is room for them at this scale or a smaller one, on the ``sides``
-    with room for them if that is enough; from the scale ``until`` on a label stands on its disc. Those whose number
-    ``alone`` says who they are are not cut."""
-    among, partners, words = set(chosen), partners_of(network), _whole(network)
+    """Labels beside discs that say these ``words``, by neuron, as far as there is room for them at this scale or a
+    smaller one, on the ``sides`` with room for them if that is enough; from the scale ``until`` on a label stands on
+    its disc. Those whose number ``alone`` says who they are are not cut."""
+    among, partners = set(chosen), partners_of(network)
     cut = Cut(base for base, _ in words)
     lines = _lines(network, ground, chosen)
     said: dict[int, list[tuple[str, str]]] = {}
@@ -327,10 +351,18 @@ def _rect(label: Label) -> Rect:
     return left - 2, y - 0.8 * label.size, left + width + 2, y + 0.25 * label.size
 
 
-def margin_beside(network: Network, radius: float, rooms: Collection[int] = ()) -> float:
+def margin_beside(
+    network: Network,
+    radius: float,
+    rooms: Collection[int] = (),
+    numbered: Mapping[int, int] = MappingProxyType({}),
+) -> float:
     """How far labels may reach beyond the discs at the rim: 0 where all fit on discs of this radius, or have ``rooms``
-    kept for them in a picture that is not reduced."""
+    kept for them in a picture that is not reduced. Those of glyphs that are ``numbered`` may have to say so."""
     words = _whole(network)
+    for index, count in numbered.items():
+        if not size_of_count(count, radius):
+            words[index] = network.neurons.labels[index], as_count(count)
     cut = Cut(base for base, _ in words)
     kept = rooms if radius >= _BESIDE_SMALLEST / _BESIDE_SHARE else ()
     named = [both for index, both in enumerate(zip(words, parts_of(network.neurons), strict=True)) if index not in kept]

@@ -143,8 +143,7 @@ def plan(
     framed = _framed(_Wanted(content, gains, settings, theme, narrowest), widths)
     frame, gains = framed.frame, in_pages(gains, framed.unit)
     page = _on_page(content, framed, gains, layout, theme)
-    sizes = {unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]}
-    said = _texts(content, page, settings, sizes)
+    said = _texts(content, page, settings)
     rings = np.minimum(2.5, 0.12 * page.radii)
     made = Plan(
         network=network,
@@ -155,14 +154,14 @@ def plan(
         radii=tuple((page.radii - rings / 2).tolist()),
         rings=tuple(rings.tolist()),
         centres=tuple((x, y) for x, y in page.centres.tolist()),
-        sizes=sizes,
+        sizes=content.sizes,
         counts={line: count for line, count in enumerate(drawn.counts.tolist()) if drawn.sheaf[line]},
         lines=page.lines,
         order=_order(network, gains.widths(network.connections.weights.whole()), seen.lines),
         depth=() if content.near is None else tuple(np.argsort(content.near, kind="stable").tolist()),
         beads=delays.beads(network, page.lines, RADIUS * frame.scale, theme),
         lesions=content.lesions,
-        labels=tuple(raised(said.labels, sizes)),
+        labels=tuple(raised(said.labels, content.sizes)),
         back=(*_box_frames(page.boxes, frame, theme), *_dotted_groups(content, page, theme)),
         between=_bundle_groups(network, page.bundles, theme, 0 if begin is None else begin.step),
         front=(
@@ -189,8 +188,9 @@ class _Content:
     positions: FloatArray
     routes: Sequence[FloatArray]
     seen: Shown
-    #: (n,) radii of discs
+    #: (n,) radii of discs, and how many neurons those are that are glyphs
     radii: FloatArray
+    sizes: Mapping[int, int]
     #: what the labels cover for which the layout kept room, by neuron, and on which side they stand
     rooms: Mapping[int, Rect]
     sides: Mapping[int, Side]
@@ -238,6 +238,7 @@ def _content(
         routes=routes,
         seen=seen,
         radii=radii,
+        sizes={unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]},
         rooms=rooms,
         sides=sides,
         boxes=boxes,
@@ -318,9 +319,9 @@ class _Texts:
     lines: Mapping[str, Text]
 
 
-def _texts(content: _Content, page: _OnPage, settings: RenderSettings, sizes: Mapping[int, int]) -> _Texts:
+def _texts(content: _Content, page: _OnPage, settings: RenderSettings) -> _Texts:
     """The texts in the network; each is in the way of those after it: titles all in one place, labels of neurons, of
-    connections, the other titles. ``sizes`` are those of glyphs."""
+    connections, the other titles."""
     network, obstacles, boxes, theme = content.network, page.obstacles, page.boxes, theme_of(settings)
     titled = _titled(boxes, page.frame, page.picture)
     framed = [index for index, box in enumerate(boxes) if box.sector is None]  # there is no one place along a ring
@@ -331,7 +332,7 @@ def _texts(content: _Content, page: _OnPage, settings: RenderSettings, sizes: Ma
     lines: Mapping[str, Text] = {}
     if settings.labels:
         hidden = (~content.seen.focus).tolist()
-        labels = labels_of(network, _ground(content, page), obstacles, hidden, sizes, content.sides)
+        labels = labels_of(network, _ground(content, page), obstacles, hidden, content.sizes, content.sides)
         if content.said:
             strongest = np.argsort(-np.abs(network.connections.weights.whole()), kind="stable").tolist()
             told = {network.connection_names[k]: (page.lines[k], content.said[k]) for k in strongest if k in page.lines}
@@ -360,7 +361,7 @@ def _ground(content: _Content, page: _OnPage) -> Ground:
         np.concatenate([np.zeros((0, 2)), *inner]),
         np.concatenate([np.zeros((0, 2)), *borders]),
         content.extent,
-        margin_beside(network, RADIUS * frame.scale, rooms) if page.margin > MARGIN else 0.0,
+        margin_beside(network, RADIUS * frame.scale, rooms, content.sizes) if page.margin > MARGIN else 0.0,
         page.obstacles.texts(),
         [box.members for box in boxes],
         outward(network, content.positions),
@@ -488,7 +489,7 @@ class _Wanted:
         if not self.settings.labels:
             return MARGIN
         content = self.content
-        reach = margin_beside(content.network, RADIUS * frame.scale, frozenset(content.rooms))
+        reach = margin_beside(content.network, RADIUS * frame.scale, frozenset(content.rooms), content.sizes)
         return _EDGE + beyond(content.extent, frame.scale, reach)
 
 
