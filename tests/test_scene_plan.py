@@ -11,6 +11,8 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 from hand_networks import C, Case, G, loop, network, numbered, plain_gains, straight, straight_layout, use_case_1
+from hypothesis import given
+from hypothesis import strategies as st
 from scenes import scene_of
 
 import neurovis_spec as nv
@@ -328,6 +330,33 @@ def test_title_true_false_or_a_text() -> None:
     assert "Other" in {t.text for t in all_texts(picture(settings=RenderSettings(title="Other")))}
     words = {t.text for t in all_texts(picture(settings=RenderSettings(title=False)))}
     assert not {w for w in words if w.startswith(("Function", "step"))}
+
+
+@pytest.mark.parametrize("size", [None, (420, 600), (900, 300)])
+def test_a_long_title_is_in_lines_and_all_else_below_them(size: tuple[int, int] | None) -> None:
+    title = (
+        "A title of many words that says at length what this network is about, who made it, when, " * 2 + "x" * 90
+    )
+    scene = picture(settings=RenderSettings(title=title, size=size))
+    lines = [s for g in scene.groups if g.id == "title" for s in g.shapes if isinstance(s, Text)]
+    assert "".join(line.text for line in lines).replace(" ", "") == title.replace(" ", "")
+    assert all(text_rect(line)[2] <= scene.width for line in lines)
+    below = [text_rect(s) for g in scene.groups if g.id != "title" for s in g.shapes if isinstance(s, Text)]
+    assert min(rect[1] for rect in below) > text_rect(lines[-1])[3] - 1
+    discs = [s.centre[1] - s.radius for s in scene.shapes() if isinstance(s, Disc)]
+    assert min(discs) > text_rect(lines[-1])[3]
+
+
+def test_a_title_that_would_take_most_of_a_picture_is_left_out() -> None:
+    scene = picture(settings=RenderSettings(title="many words " * 40, size=(300, 260)))
+    assert not [g for g in scene.groups if g.id == "title"]
+
+
+@given(st.text(alphabet="ab cdefw ", max_size=60), st.floats(3, 90))
+def test_lines_hold_all_words_and_are_no_wider_than_their_room(text: str, room: float) -> None:
+    lines = texts.wrapped(text, 10, room)
+    assert "".join(lines).replace(" ", "") == text.replace(" ", "")
+    assert all(texts.width(line, 10) <= room or len(line) == 1 for line in lines)
 
 
 def test_the_size_is_what_the_author_says() -> None:

@@ -1,8 +1,8 @@
 """The heading of a picture: its title, and the line under it: the step, the time where the spec gives a time step, the
 error where a rule has a target.
 
-In: texts; a network and activities. Out: texts with their places, cut to the width of the picture, such as ``step 160 ·
-8.00 s · error +0.28``.
+In: texts; a network and activities. Out: texts with their places, such as ``step 160 · 8.00 s · error +0.28``. A title
+takes as many lines as the width of the picture asks for; all below it is so much lower.
 """
 
 from __future__ import annotations
@@ -19,17 +19,30 @@ from neurovis_spec.scene.model import Text, Theme
 
 TITLE, CAPTION = 17.0, 11.5
 TITLE_Y, CAPTION_Y, HEADER = 35.0, 54.0, 58.0
+#: From a line of a title to the next; and the share of a picture's height that all but the first take at most.
+_LINE, MOST_TITLE = 21.0, 0.3
 
 
 def title_text(title: str, width: float, theme: Theme) -> Text:
-    """The title of a picture of this width."""
+    """The title of a picture of this width, in one line."""
     words = texts.shorten(title, TITLE, width - 2 * MARGIN, 600)
     return Text((MARGIN, TITLE_Y), words, TITLE, theme.ink, weight=600)
 
 
-def caption_text(words: str, width: float, theme: Theme) -> Text:
-    """The line under the title."""
-    return Text((MARGIN, CAPTION_Y), texts.shorten(words, CAPTION, width - 2 * MARGIN), CAPTION, theme.muted)
+def title_lines(title: str, width: float, theme: Theme) -> tuple[Text, ...]:
+    """The title of a picture of this width, in as many lines as it takes."""
+    lines = enumerate(texts.wrapped(title, TITLE, width - 2 * MARGIN, 600))
+    return tuple(Text((MARGIN, TITLE_Y + _LINE * row), words, TITLE, theme.ink, weight=600) for row, words in lines)
+
+
+def lowered(title: str, width: float) -> float:
+    """How much lower all stands in a picture of this width because the title has several lines."""
+    return _LINE * (len(texts.wrapped(title, TITLE, width - 2 * MARGIN, 600)) - 1)
+
+
+def caption_text(words: str, width: float, theme: Theme, down: float = 0.0) -> Text:
+    """The line under the title, so much lower than under one of one line."""
+    return Text((MARGIN, CAPTION_Y + down), texts.shorten(words, CAPTION, width - 2 * MARGIN), CAPTION, theme.muted)
 
 
 def caption(network: Network, step: int, activity: FloatArray) -> str:

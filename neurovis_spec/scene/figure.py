@@ -15,7 +15,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene.body import PLOT, BodyPicture
-from neurovis_spec.scene.caption import HEADER, caption, caption_text, title_text
+from neurovis_spec.scene.caption import HEADER, MOST_TITLE, caption, caption_text, lowered, title_lines
 from neurovis_spec.scene.encode import CAPTION
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.frame import DENSEST, DENSITIES, MARGIN, MOST, whole
@@ -67,21 +67,22 @@ def figure(network: Network, layout: Layout | None, look: Look, shots: Shots, ga
     maker = Maker(network, layout, shots, gains.each, explained, settings.min_weight)
     others = {number: maker.block(panel) for number, panel in enumerate(look.panels) if panel.view != "network"}
     title = _title(network, settings)
-    head = HEADER + _TOP if title is not None else _TOP
     picture, sheet, blocks = None, _sheet(settings), list(others.values())
     if look.shows("network"):
         assert gains.picture is not None
-        own, narrowest = _beside(settings, blocks, head), PAGE if others else 0.0
+        own, narrowest = _beside(settings, blocks, _head(title, sheet.width)), PAGE if others else 0.0
         picture = film(network, layout, shots.snapshots(network), gains.picture, own, look.fps or 1.0, narrowest)
         blocks = [others.get(number, Drawing(picture)) for number in range(len(look.panels))]
         density = picture.scene.density
         sheet = _Sheet(picture.scene.width, None if settings.size is None else settings.size[1] / density, density)
     span = span_of(blocks, shots, sheet.width, network.shown_dt)
     theme, captions = theme_of(settings), _captions(network, shots)
+    head, down = _head(title, sheet.width), 0.0 if title is None else lowered(title, sheet.width)
     parts, bottom = _placed(blocks, sheet, span, theme, head)
     if title is not None:
-        texts = title_text(title, sheet.width, theme), caption_text(captions[0], sheet.width, theme)
-        parts.insert(0, (0.0, Part((Group(texts[:1], id="title"), Group(texts[1:], id=CAPTION)), HEADER)))
+        under = caption_text(captions[0], sheet.width, theme, down)
+        heading = Group(title_lines(title, sheet.width, theme), id="title"), Group((under,), id=CAPTION)
+        parts.insert(0, (0.0, Part(heading, head - _TOP)))
     said = tuple(caption_text(words, sheet.width, theme).text for words in captions)
     names = tuple(f"{network.title or network.name}, {words}" for words in captions)
     sheet, parts = _fitted(sheet, parts, bottom, settings)
@@ -134,10 +135,18 @@ def _captions(network: Network, shots: Shots) -> list[str]:
 
 
 def _title(network: Network, settings: RenderSettings) -> str | None:
-    """What stands above all; nothing on a page that is too low."""
+    """What stands above all; nothing on a page that is too low for it."""
     words = settings.title if isinstance(settings.title, str) else network.title or network.name
-    low = settings.size is not None and settings.size[1] < 4 * HEADER
-    return None if settings.title is False or not words or low else words
+    if settings.title is False or not words:
+        return None
+    sheet = _sheet(settings)
+    low = sheet.height is not None and lowered(words, sheet.width) > MOST_TITLE * sheet.height
+    return None if low or (settings.size is not None and settings.size[1] < 4 * HEADER) else words
+
+
+def _head(title: str | None, width: float) -> float:
+    """Where the first view begins on a page of this width."""
+    return _TOP if title is None else HEADER + lowered(title, width) + _TOP
 
 
 def _sheet(settings: RenderSettings) -> _Sheet:

@@ -61,13 +61,18 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """What stands around the layout: a header (width and height), a footer as high as ``footer(width)``, and how wide
-    the picture should be for their sake; and the margin on either side."""
+    """What stands around the layout: a header, so ``wide``, and a footer, as high as ``header(width)`` and
+    ``footer(width)``, and how wide the picture should be for their sake; and the margin on either side."""
 
-    header: tuple[float, float]
+    wide: float
+    header: Callable[[float], float]
     footer: Callable[[float], float]
     narrowest: float
     margin: float = MARGIN
+
+    def around(self, width: float) -> float:
+        """How high header and footer are in a picture of this width."""
+        return self.header(width) + self.footer(width)
 
 
 def unit_for(radius: float, widths: FloatArray) -> float:
@@ -89,8 +94,8 @@ def fit(extent: Rect, margins: Margins, size: tuple[int, int] | None) -> Frame:
         wide, high, scale, density = _natural(across, down, margins)
     else:
         wide, high, scale, density = _within(across, down, margins, (float(size[0]), float(size[1])))
-    free = high - margins.header[1] - margins.footer(wide) - down * scale
-    left, top = (wide - across * scale) / 2, margins.header[1] + max(free, 0.0) / 2
+    free = high - margins.header(wide) - margins.footer(wide) - down * scale
+    left, top = (wide - across * scale) / 2, margins.header(wide) + max(free, 0.0) / 2
     return Frame(wide, high, scale, left - x0 * scale, top - y0 * scale, density)
 
 
@@ -99,10 +104,10 @@ def _natural(across: float, down: float, margins: Margins) -> tuple[float, float
     wide = MOST[0]
     scale = UNIT
     for _ in range(3):  # the footer's height depends on the width, the width on the scale, the scale on the height left
-        scale = min(UNIT, _scale(across, down, margins, (MOST[0], MOST[1]), margins.footer(wide)))
-        natural = max(across * scale + 2 * margins.margin, margins.header[0] + 2 * MARGIN, margins.narrowest)
+        scale = min(UNIT, _scale(across, down, margins, (MOST[0], MOST[1]), margins.around(wide)))
+        natural = max(across * scale + 2 * margins.margin, margins.wide + 2 * MARGIN, margins.narrowest)
         wide = min(MOST[0], whole(natural))
-    high = min(MOST[1], whole(margins.header[1] + down * scale + margins.footer(wide) + 2 * MARGIN))
+    high = min(MOST[1], whole(margins.header(wide) + down * scale + margins.footer(wide) + 2 * MARGIN))
     density = next(d for d in DENSITIES if d == 1 or (wide * d <= MOST[0] and high * d <= MOST[1]))
     return wide, high, scale, density
 
@@ -119,7 +124,7 @@ def _within(
 
     def at(density: float) -> float:
         wide, high = size[0] / density, size[1] / density
-        return _scale(across, down, margins, (wide, high), margins.footer(wide))
+        return _scale(across, down, margins, (wide, high), margins.around(wide))
 
     low, high = 1.0, max(1.0, min(DENSEST, size[0] / margins.narrowest))
     if at(high) >= UNIT:
@@ -130,7 +135,7 @@ def _within(
     return size[0] / low, size[1] / low, min(_LARGEST * UNIT, at(low)), low
 
 
-def _scale(across: float, down: float, margins: Margins, room: tuple[float, float], footer: float) -> float:
-    """The most page units for a layout unit."""
-    left = room[1] - margins.header[1] - footer - 2 * MARGIN
+def _scale(across: float, down: float, margins: Margins, room: tuple[float, float], around: float) -> float:
+    """The most page units for a layout unit, with so much above and below."""
+    left = room[1] - around - 2 * MARGIN
     return max(1e-9, min(max(room[0] - 2 * margins.margin, 8.0) / across, max(left, 8.0) / down))

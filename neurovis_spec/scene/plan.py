@@ -24,7 +24,16 @@ from neurovis_spec.layout.naming import natural_key
 from neurovis_spec.projection import called, nearness
 from neurovis_spec.scene import bundles, delays, encoding, legend, texts
 from neurovis_spec.scene.boxes import Box, boxes_of, entitled, outward
-from neurovis_spec.scene.caption import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
+from neurovis_spec.scene.caption import (
+    CAPTION,
+    CAPTION_Y,
+    HEADER,
+    MOST_TITLE,
+    TITLE,
+    caption_text,
+    lowered,
+    title_lines,
+)
 from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.ends import EndArray, SetEnds, signed
 from neurovis_spec.scene.fading import seconds_of, sent_seconds_of, told_times
@@ -68,7 +77,7 @@ _NOTE_LINE, _EDGE = 16.0, 6.0
 _FAR = 0.55
 #: how large a neuron is that is out of focus
 _UNFOCUSED = 0.4
-#: a picture is made so wide at most to have its legend in one row, and its whole title
+#: a picture is made so wide at most to have its legend in one row, and its title in one line
 _ROOM = 840.0
 #: more dotted lines than this would not be quiet
 _MOST_TEACHERS = 200
@@ -104,7 +113,8 @@ class Plan:
     back: tuple[Group, ...]
     between: tuple[Group, ...]
     front: tuple[Group, ...]
-    captioned: bool
+    #: how much lower than under a title of one line the caption is; None without one
+    captioned: float | None
     #: user units in a page unit
     unit: float
     #: what is left out, as the picture says it
@@ -116,9 +126,9 @@ class Plan:
 
     def caption_shape(self, words: str) -> Text | None:
         """The line under the title, if there is one."""
-        if not self.captioned:
+        if self.captioned is None:
             return None
-        return scaled(caption_text(words, self.frame.width / self.unit, self.theme), self.unit)
+        return scaled(caption_text(words, self.frame.width / self.unit, self.theme, self.captioned), self.unit)
 
 
 def plan(
@@ -172,7 +182,7 @@ def plan(
             *(Group((said.titles[index],), id=f"title:{page.boxes[index].path}") for index in sorted(said.titles)),
             *framed.around(content.notes, theme),
         ),
-        captioned=framed.title is not None,
+        captioned=None if framed.title is None else lowered(framed.title, frame.width),
         unit=1.0,
         notes=content.notes,
     )
@@ -512,15 +522,15 @@ class _Framed:
 
     def picture(self, notes: int) -> Rect:
         """What the network has of the page, below so many notes."""
-        top = _top(self.title is not None, notes) or 4.0
+        top = _top(self.title, self.frame.width, notes) or 4.0
         return 6.0, top, self.frame.width - 6.0, self.bottom - (8.0 if self.items else 0.0)
 
     def around(self, notes: Sequence[str], theme: Theme) -> Iterator[Group]:
         """Title, notes and legend."""
         if self.title is not None:
-            yield Group((title_text(self.title, self.frame.width, theme),), id="title")
+            yield Group(title_lines(self.title, self.frame.width, theme), id="title")
         if notes:
-            yield _noted(notes, self.title is not None, self.frame, theme)
+            yield _noted(notes, self.title, self.frame, theme)
         if self.items:
             yield legend.flow(self.items, self.frame.width - 2 * MARGIN, MARGIN, self.bottom)
 
@@ -583,19 +593,27 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
 
     fitting = min(max(legend.widest_row(items, _ROOM - 2 * MARGIN) + 2 * MARGIN, 120.0), _ROOM)
     narrowest = max(fitting, wanted.narrowest)
-    header = (min(across, _ROOM - 2 * MARGIN), _top(title is not None, len(content.notes)))
-    margins = Margins(header, footer, narrowest, margin)
-    return title, items, fit(content.extent, margins, settings.size)
+    for said in dict.fromkeys((title, None)):  # a title that would take most of the picture goes
+
+        def header(width: float, said: str | None = said) -> float:
+            return _top(said, width, len(content.notes))
+
+        margins = Margins(min(across, _ROOM - 2 * MARGIN), header, footer, narrowest, margin)
+        frame = fit(content.extent, margins, settings.size)
+        if said is None or lowered(said, frame.width) <= MOST_TITLE * frame.height:
+            break
+    return said, items, frame
 
 
-def _top(titled: bool, notes: int) -> float:
-    """How high the header is."""
-    return (HEADER if titled else 8.0 if notes else 0.0) + _NOTE_LINE * notes
+def _top(title: str | None, width: float, notes: int) -> float:
+    """How high the header is in a picture of this width."""
+    titled = 0.0 if title is None else HEADER + lowered(title, width)
+    return (titled or (8.0 if notes else 0.0)) + _NOTE_LINE * notes
 
 
-def _noted(notes: Sequence[str], titled: bool, frame: Frame, theme: Theme) -> Group:
+def _noted(notes: Sequence[str], title: str | None, frame: Frame, theme: Theme) -> Group:
     """What is left out, below the caption."""
-    first = (CAPTION_Y if titled else 4.0) + _NOTE_LINE
+    first = (4.0 if title is None else CAPTION_Y + lowered(title, frame.width)) + _NOTE_LINE
     room = frame.width - 2 * MARGIN
     lines = [
         Text((MARGIN, first + _NOTE_LINE * place), texts.shorten(note, CAPTION, room), CAPTION, theme.muted)

@@ -1,7 +1,7 @@
 """Texts: how wide they are at most (``text_width``), shortened to a width, numbers for people.
 
-In: strings; all names that stand together in a picture (Cut). Out: widths in user units; shorter strings, which can
-still be told apart: the beginning of a name and an ellipsis, or its end, if others begin in the same way.
+In: strings; all names that stand together in a picture (Cut). Out: widths in user units; lines; shorter strings, which
+can still be told apart: the beginning of a name and an ellipsis, or its end, if others begin in the same way.
 """
 
 from __future__ import annotations
@@ -12,7 +12,17 @@ from collections.abc import Iterable
 
 from neurovis_spec.text_width import FAMILIES, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, width, with_subscript
 
-__all__ = ["FAMILIES", "SUBSCRIPT_DROP", "SUBSCRIPT_SIZE", "Cut", "number", "shorten", "width", "with_subscript"]
+__all__ = [
+    "FAMILIES",
+    "SUBSCRIPT_DROP",
+    "SUBSCRIPT_SIZE",
+    "Cut",
+    "number",
+    "shorten",
+    "width",
+    "with_subscript",
+    "wrapped",
+]
 
 
 def shorten(text: str, size: float, room: float, weight: int = 400) -> str:
@@ -30,6 +40,31 @@ def shorten(text: str, size: float, room: float, weight: int = 400) -> str:
 
 def _begun(text: str, end: int) -> str:
     return text[:end].rstrip() + "…"
+
+
+def wrapped(text: str, size: float, room: float, weight: int = 400) -> list[str]:
+    """The text in as many lines as it takes, each no wider than ``room``: broken between words, within a word where it
+    is wider by itself; at least a letter a line.
+
+    >>> wrapped("a title of several words", 10, 60)
+    ['a title of', 'several', 'words']
+    >>> wrapped("extraordinarily", 10, 40)
+    ['extraor', 'dinarily']
+    """
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".lstrip()
+        if width(longer, size, weight) <= room:
+            lines[-1] = longer
+            continue
+        if lines[-1]:
+            lines.append("")
+        while width(word, size, weight) > room and len(word) > 1:
+            end = bisect_right(range(1, len(word)), room, key=lambda end: width(word[:end], size, weight))
+            lines[-1:] = [word[: max(end, 1)], ""]
+            word = word[max(end, 1) :]
+        lines[-1] = word
+    return lines
 
 
 def number(value: float, digits: int = 3, sign: bool = False) -> str:
