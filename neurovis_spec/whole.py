@@ -24,6 +24,8 @@ from neurovis_spec.compiler.drawing.sections import line_style
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.edge_list import EdgeTable
 from neurovis_spec.language.data.files import NamedFile, read_edges, read_sheet, read_table
+from neurovis_spec.language.data.sheet import Sheet
+from neurovis_spec.language.data.table import MOST_CELLS
 from neurovis_spec.language.located import Leaf, Located
 from neurovis_spec.language.modules import INCLUDED
 from neurovis_spec.language.spec import Spec
@@ -38,7 +40,7 @@ from neurovis_spec.language.tables import (
     edge_column,
 )
 from neurovis_spec.language.unknown import UNKNOWN
-from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, one_or_more
+from neurovis_spec.language.yaml.source import AnyList, Entry, Node, Scalar, one_or_more
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
 _WHERE: Final = TypeAdapter(Annotated[tuple[Condition, ...], Leaf(as_where, WHERE.shape)])
@@ -121,6 +123,8 @@ class _Reader:
             )
             if is_matrix and node.get("file") is not None:
                 return self._table(node, folder)
+            if path[-1:] == ("spikes",) and node.get("file") is not None:
+                return self._spikes(node, folder)
             if path and path[-1] == "edges" and node.get("file") is not None:
                 return self._edges(node, folder)
             if self._columns is not None and node.get("column") is not None and path[-1] != "label":
@@ -130,6 +134,8 @@ class _Reader:
             return self.mapping(node, folder, path)
         if isinstance(node, AnyList):
             return [self.value(item, folder, path) for item in node.items]
+        if path[-3:-2] == ("inputs",) and path[-1] == "spikes" and isinstance(node, Scalar):  # a path
+            return self._spikes(SourceMapping((Entry(Scalar("file", node.span), node),), node.span), folder)
         return node.value
 
     def _named(self, node: SourceMapping, folder: Path) -> NamedFile:
@@ -155,12 +161,20 @@ class _Reader:
         used = [one for key in ("column", "columns", "by") if (found := node.get(key)) for one in one_or_more(found)]
         names = {str(one.value): Located(str(one.value), one) for one in used if isinstance(one, Scalar)}
         rest = {e.name: self.value(e.value, folder, ()) for e in node.entries if e.name not in ("file", "key", "where")}
-        if sheet is UNKNOWN:
-            return None
-        text = StringIO()
-        columns = [sheet.texts(name) for name in names.values()]
-        csv.writer(text, lineterminator="\n").writerows([[*names], *zip(*columns, strict=True)])
-        return {"csv": text.getvalue(), **rest}
+        return None if sheet is UNKNOWN else {"csv": _text_of(sheet, names.values()), **rest}
+
+    def _spikes(self, node: SourceMapping, folder: Path) -> Plain:
+        """A table of spikes, with its two columns as a text."""
+        sheet = read_sheet(self._named(node, folder), (), self._findings, MOST_CELLS)
+        called = node.get("columns")
+        names: dict[str, Located[str]] = {}
+        for key in ("time", "index"):
+            written = called.get(key) if isinstance(called, SourceMapping) else None
+            name = written if isinstance(written, Scalar) else Scalar(key, node.span)
+            names[key] = Located(str(name.value), name)
+        rest = {e.name: self.value(e.value, folder, ()) for e in node.entries if e.name != "file"}
+        columns = {name.value: name for name in names.values()}
+        return None if sheet is UNKNOWN else {"csv": _text_of(sheet, columns.values()), **rest}
 
     def _edges(self, node: SourceMapping, folder: Path) -> Plain:
         written = self._written(node)._replace(texts=self._texts, perhaps=self._perhaps)
@@ -187,6 +201,14 @@ class _Reader:
         written = self._written(edges)._replace(more=tuple({name.value: name for name in more}.values()))
         table = read_edges(self._named(edges, folder), self._findings, written=written)
         return None if table is UNKNOWN else EdgeColumns.of(table)
+
+
+def _text_of(sheet: Sheet, names: Iterable[Located[str]]) -> str:
+    """Some columns of a table, as a text."""
+    text, used = StringIO(), [*names]
+    columns = [sheet.texts(name) for name in used]
+    csv.writer(text, lineterminator="\n").writerows([[name.value for name in used], *zip(*columns, strict=True)])
+    return text.getvalue()
 
 
 def _has_columns(node: SourceMapping) -> bool:

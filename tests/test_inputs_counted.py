@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 from exported import LANGUAGES, exported
 from hypothesis import given
@@ -127,6 +128,53 @@ def test_spikes_with_and_without_a_file_are_the_same_network(tmp_path: Path) -> 
     assert nv.compile(tmp_path / "s.yaml").hash == listed.hash
     assert of("{spikes: {times: [[0.001], [0.03, 2*0.001]]}}", 2).hash == listed.hash
     assert of("{spikes: {times: [[1], [3, 30]], time: ms}}", 2).hash != listed.hash
+
+
+def test_spikes_are_read_of_tables_of_every_kind(tmp_path: Path) -> None:
+    times, ids = np.array([0.002, 0.001, 0.03]), np.array([1, 0, 1])
+    rows = "".join(f"{time}\tcell {index}\t{index}\n" for time, index in zip(times, ids, strict=True))
+    (tmp_path / "s.tsv").write_text(f"t_s\tname\tid\n{rows}")
+    (tmp_path / "s.csv").write_text(f"t_s;name;id\n{rows}".replace("\t", ";"))
+    np.savez(tmp_path / "s.npz", t_s=times, id=ids, name=np.array(["a", "b", "c"]))
+    pandas.DataFrame({"t_s": times, "id": ids}).to_parquet(tmp_path / "s.parquet")
+    wanted = of("{spikes: {times: [[1], [2, 30]], time: ms}}", 2)
+    text = f"{HEAD}inputs: {{s: {{spikes: {{%s, columns: {{time: t_s, index: id}}}}, size: 2}}}}\n"
+    text += "neurons: {A: {count: 2, input: s}}"
+    for suffix in ("tsv", "csv", "npz", "parquet"):
+        network = nv.compile_text(text % f"file: s.{suffix}", folder=tmp_path)
+        assert network.hash == wanted.hash
+        # the spec as one text has them within
+        assert nv.compile_text(network.text()).hash == wanted.hash
+    inline = 'csv: "t_s,id\\n0.001,0\\n0.002,1\\n0.03,1\\n"'
+    assert nv.compile_text(text % inline).hash == wanted.hash
+    (tmp_path / "s.csv").write_text("index,time\n")
+    none = nv.compile_text(
+        f"{HEAD}inputs: {{s: {{spikes: s.csv, size: 2}}}}\nneurons: {{A: {{count: 2, input: s}}}}", folder=tmp_path
+    )
+    assert not none.run(5)["A"].any()
+    assert nv.compile_text(none.text()).hash == none.hash
+
+
+@pytest.mark.parametrize(
+    ("rows", "messages"),
+    [
+        ("0.1,x\ny,1\n", ["row 3, column 1: 'y' is no number", "row 2, column 2: 'x' is no number"]),
+        ("0.1,\n", ["row 2, column 2 of the file is empty; a spike needs a number everywhere"]),
+        ("0.1,nan\n", ["row 2, column 2: 'nan' is not finite"]),
+        ("0.1,1,2\n", ["row 2 has 3 cells, the header 2"]),
+        ("-1,1\n1,2.5\n", ["row 2, column 1 of the file: a spike is at 0", "row 3, column 2 of the file: numbers of"]),
+    ],
+)
+def test_rows_that_are_no_spikes(tmp_path: Path, rows: str, messages: list[str]) -> None:
+    (tmp_path / "s.csv").write_text("time,index\n" + rows)
+    text = f"{HEAD}inputs: {{s: {{spikes: s.csv, size: 2}}}}\nneurons: {{A: {{count: 2, input: s}}}}"
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(text, folder=tmp_path)
+    found = [(item.message, item.hint or "") for item in caught.value.diagnostics]
+    assert len(found) == len(messages)
+    for (message, hint), wanted in zip(found, messages, strict=True):
+        assert wanted in message
+        assert "an empty cell means" not in hint
 
 
 def test_a_caller_replaces_what_is_counted() -> None:

@@ -180,17 +180,28 @@ class SpikesModel(Model):
     BARE: ClassVar[str] = "file"
     ELSEWHERE: ClassVar[AnyMapping[str, str]] = {"unit": "time", "values": "times"}
 
-    file: TextField | None = Field(None, description="A .csv file with a header and a row for each spike.")
-    times: Annotated[AnyList | None, Leaf(_times, ListOf(ListOf(FORMULA))), NotWith(("file",))] = Field(
+    file: TextField | None = Field(
+        None, description="A table with a row for each spike: .csv, .tsv, .txt, .dat, .npz or .parquet."
+    )
+    csv: Annotated[TextField | None, NotWith(("file",))] = Field(
+        None, description="The table itself, as a text, in place of a file."
+    )
+    times: Annotated[AnyList | None, Leaf(_times, ListOf(ListOf(FORMULA))), NotWith(("file", "csv"))] = Field(
         None, description="The times inline: a list for each number of the input."
     )
     columns: Annotated[
         SpikeColumnsModel | None,
-        Needs(("file",), "'columns' are those of a 'file'", "remove 'columns'"),
+        Needs(("file", "csv"), "'columns' are those of a 'file'", "remove 'columns'"),
     ] = Field(None, description="What the columns of the file are called: {time: t_ms, index: id}.")
     time: Annotated[Located[str], words(*TIMES, abouts=TIME_ABOUTS)] | None = Field(
         None, description="The unit of the times (default s)."
     )
+
+    @property
+    def table(self) -> FileReference | None:
+        """The table of the spikes."""
+        text = self.file or self.csv
+        return None if text is None else FileReference(text, None, text.span, inline=self.file is None)
 
 
 class InputModel(Model):

@@ -1,4 +1,4 @@
-"""Spikes at given times, from a file or from lists in the spec.
+"""Spikes at given times, from a table or from lists in the spec.
 
 In: the ``spikes`` of an input. Out: the input with Spikes; findings at the times, or at the cells of the file, that are
 none.
@@ -6,7 +6,7 @@ none.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -17,12 +17,14 @@ from neurovis_spec.compiler.limits import PATIENCE, plural
 from neurovis_spec.compiler.network import Input, Spikes
 from neurovis_spec.compiler.values.cells import Cells, cells_of, values_of
 from neurovis_spec.compiler.values.constants import Constants
-from neurovis_spec.compiler.values.data_files import Files
+from neurovis_spec.compiler.values.data_files import Files, OpenSheet
 from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.data.cells import is_number
 from neurovis_spec.language.data.columns import no_column
-from neurovis_spec.language.data.table import Table
+from neurovis_spec.language.data.table import MOST_CELLS
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.sections import InputModel, SpikesModel
+from neurovis_spec.language.tables import FileReference
 from neurovis_spec.language.units import TIMES
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.source import AnyList
@@ -36,12 +38,12 @@ def by_spikes(
     """The input with its spikes: that of its size, for a file, or ``bare``, which has a number for each list."""
     findings = constants.findings
     unit = None if "time" in spikes.unknown else "s" if spikes.time is None else spikes.time.value
-    if spikes.file is not None:
+    if spikes.table is not None:
         if model.size is None and "size" not in model.unknown:
             message = "how many numbers the input has, no file of spikes says, as some may have none"
-            findings.error("missing-key", spikes.file.span, message, "write size: N beside 'spikes'")
+            findings.error("missing-key", spikes.table.span, message, "write size: N beside 'spikes'")
             sized = UNKNOWN
-        found = _from_file(spikes.file, spikes, sized, files)
+        found = _from_file(spikes.table, spikes, sized, files)
         size = UNKNOWN if sized is UNKNOWN else sized.size
     elif spikes.times is not None:
         found, size = _from_lists(spikes.times, constants), len(spikes.times)
@@ -50,7 +52,7 @@ def by_spikes(
             findings.error("wrong-size", spikes.times.span, message, "remove 'size', or give a list for each")
             return UNKNOWN
     else:
-        if spikes.unknown.isdisjoint(("file", "times")):
+        if spikes.unknown.isdisjoint(("file", "csv", "times")):
             hint = "write {file: PATH} or {times: [[0.1, 0.2], []]}"
             findings.error("missing-key", spikes.source.span, "'spikes' needs a 'file' or 'times'", hint)
         return UNKNOWN
@@ -94,20 +96,18 @@ def _negative_in_lists(cells: Cells, times: FloatArray, findings: Findings) -> b
 
 
 def _from_file(
-    path: Located[str], spikes: SpikesModel, sized: Input | Unknown, files: Files
+    file: FileReference, spikes: SpikesModel, sized: Input | Unknown, files: Files
 ) -> tuple[FloatArray, IntArray] | Unknown:
-    """The times of a file, and of which number of the input each is."""
-    table = files.spikes_at(path)
-    if table is UNKNOWN:
+    """The times of a table, and of which number of the input each is."""
+    sheet, findings, path = files.sheet(file, most=MOST_CELLS), files.findings, file.path
+    if sheet is UNKNOWN or not _has_header(sheet.sheet.header, path, findings):
         return UNKNOWN
-    written = spikes.columns
-    columns = [
-        _column(table, path, key, None if written is None else getattr(written, key), files.findings)
-        for key in ("time", "index")
-    ]
-    if UNKNOWN in columns or (written is not None and written.unknown) or "columns" in spikes.unknown:
+    columns = spikes.columns
+    names = [(key, None if columns is None else getattr(columns, key)) for key in ("time", "index")]
+    read = [_column(sheet, path, key, written) for key, written in names]
+    found = [one for one in read if one is not UNKNOWN]
+    if len(found) < len(read) or (columns is not None and columns.unknown) or "columns" in spikes.unknown:
         return UNKNOWN
-    found = [(column, table.values[:, column]) for column in columns if column is not UNKNOWN]
     (time, times), (index, indices) = found
     within = np.inf if sized is UNKNOWN else sized.size
 
@@ -121,25 +121,40 @@ def _from_file(
         (index, (indices < 0) | (indices != np.floor(indices)) | (indices >= within), is_index, indices),
     )
     for column, wrong, told, values in checks:
-        for row in np.flatnonzero(wrong)[:PATIENCE].tolist():
-            message = f"row {row + 2}, column {column + 1} of the file: {told(float(values[row]))}"
-            files.findings.error("out-of-range", path.span, message, key=(row, column))
+        for place in np.flatnonzero(wrong)[:PATIENCE].tolist():
+            row = sheet.sheet.where(place)
+            message = f"row {row}, column {column} of the file: {told(float(values[place]))}"
+            findings.error("out-of-range", path.span, message, key=(row, column))
     if any(wrong.any() for _, wrong, _, _ in checks):
         return UNKNOWN
     return times, indices.astype(np.int64)
 
 
+def _has_header(header: Sequence[str], path: Located[str], findings: Findings) -> bool:
+    """Whether the columns of a table have names; a finding where its first row is one of numbers."""
+    if not all(map(is_number, header)):
+        return True
+    message = "the first row of a file of spikes names its columns: time,index"
+    findings.error("file-format", path.span, message)
+    return False
+
+
 def _column(
-    table: Table, path: Located[str], key: str, written: Located[str] | None, findings: Findings
-) -> int | Unknown:
-    """Where the column of the times, or of the indices, stands in a file."""
-    if table.header is None:
-        message = "the first row of a file of spikes names its columns: time,index"
-        findings.error("file-format", path.span, message)
-        return UNKNOWN
+    sheet: OpenSheet, path: Located[str], key: str, written: Located[str] | None
+) -> tuple[int, FloatArray] | Unknown:
+    """Where the column of the times, or of the indices, stands in a table, from 1, and its numbers."""
+    header, findings = sheet.sheet.header, sheet.findings
     wanted = key if written is None else written.value
-    if wanted in table.header:
-        return table.header.index(wanted)
-    error = no_column(table.header, wanted, path if written is None else written)
-    findings.error(error.code, path.span if error.span is None else error.span, str(error), error.hint)
-    return UNKNOWN
+    if wanted not in header:
+        error = no_column(header, wanted, path if written is None else written)
+        findings.error(error.code, path.span if error.span is None else error.span, str(error), error.hint)
+        return UNKNOWN
+    values = sheet.numbers(Located(wanted, path.node), gaps=False)
+    if values is UNKNOWN:
+        return UNKNOWN
+    column, empty = header.index(wanted) + 1, np.flatnonzero(np.isnan(values))
+    for place in empty[:PATIENCE].tolist():
+        row = sheet.sheet.where(place)
+        message = f"row {row}, column {column} of the file is empty; a spike needs a number everywhere"
+        findings.error("file-format", path.span, message, key=(row, column))
+    return UNKNOWN if len(empty) else (column, values)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from neurovis_spec.compiler.limits import amount
-from neurovis_spec.diagnostics import Findings, shorten
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.files import (
     CellError,
     NamedFile,
@@ -25,7 +25,7 @@ from neurovis_spec.language.data.files import (
     read_table,
 )
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.tables import EdgeFile, FileReference, TableColumn
+from neurovis_spec.language.tables import Condition, EdgeFile, FileReference
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 if TYPE_CHECKING:
@@ -78,11 +78,12 @@ class OpenSheet:
     _numbers: dict[str, FloatArray | Unknown] = field(default_factory=dict)
     _texts: dict[str, tuple[str, ...] | Unknown] = field(default_factory=dict)
 
-    def numbers(self, column: Located[str]) -> FloatArray | Unknown:
-        """A column of numbers, NaN where a cell is empty; UNKNOWN where one is invalid, which is reported."""
+    def numbers(self, column: Located[str], *, gaps: bool = True) -> FloatArray | Unknown:
+        """A column of numbers, NaN where a cell is empty; UNKNOWN where one is invalid, which is reported. ``gaps``:
+        whether a cell may be."""
         if column.value not in self._numbers:
-            read = partial(self.sheet.numbers, column)
-            self._numbers[column.value] = read_column(self.named._replace(span=column.span), read, self.findings)
+            named, read = self.named._replace(span=column.span), partial(self.sheet.numbers, column)
+            self._numbers[column.value] = read_column(named, read, self.findings, gaps=gaps)
         return self._numbers[column.value]
 
     def texts(self, column: Located[str]) -> tuple[str, ...] | Unknown:
@@ -140,21 +141,16 @@ class Files:
         reference = FileReference(path, None, path.span)
         return self.table(reference, full="an input needs a number everywhere", keyed=False)
 
-    def spikes_at(self, path: Located[str]) -> Table | Unknown:
-        """The table of a ``.csv`` file of spikes, a row each."""
-        if not path.value.lower().endswith(".csv"):
-            message = f"spikes are read from a .csv file, not from '{shorten(path.value)}'"
-            self.findings.error("file-format", path.span, message)
-            return UNKNOWN
-        return self.table(FileReference(path, None, path.span), full="a spike needs a number everywhere", keyed=False)
-
-    def sheet(self, wanted: TableColumn) -> OpenSheet | Unknown:
-        """The rows of a table that count, whose columns have names."""
-        key = None if wanted.file.key is None else wanted.file.key.value
-        what = wanted.file.path.value, wanted.file.inline, key, *(one.what for one in wanted.where)
+    def sheet(
+        self, file: FileReference, where: tuple[Condition, ...] = (), most: int | None = None
+    ) -> OpenSheet | Unknown:
+        """The rows of a table that count, whose columns have names: of at most so many rows, or as many as neurons may
+        have."""
+        key = None if file.key is None else file.key.value
+        what = file.path.value, file.inline, key, most, *(one.what for one in where)
         if what not in self._sheets:
-            named = self._named(wanted.file)
-            sheet = read_sheet(named, wanted.where, self.findings)
+            named = self._named(file)
+            sheet = read_sheet(named, where, self.findings, most)
             self._sheets[what] = UNKNOWN if sheet is UNKNOWN else OpenSheet(sheet, named, self.findings)
         return self._sheets[what]
 

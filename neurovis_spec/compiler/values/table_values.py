@@ -54,7 +54,7 @@ class TableReader:
 
     def texts(self, wanted: TableColumn, *, gaps: bool = False) -> tuple[str, ...] | Unknown:
         """A text for each neuron; "" where a cell is empty, if there may be ``gaps``."""
-        sheet = self.files.sheet(wanted)
+        sheet = self.files.sheet(wanted.file, wanted.where)
         (column,) = wanted.columns
         texts = UNKNOWN if sheet is UNKNOWN else sheet.texts(column)
         rows = UNKNOWN if sheet is UNKNOWN else self._rows(wanted, sheet)
@@ -69,7 +69,7 @@ class TableReader:
 
     def all_texts(self, wanted: TableColumn) -> tuple[tuple[str, int], ...] | Unknown:
         """The texts of all rows that count, none of which is empty, and which rows of the file these are."""
-        sheet = self.files.sheet(wanted)
+        sheet = self.files.sheet(wanted.file, wanted.where)
         (column,) = wanted.columns
         texts = UNKNOWN if sheet is UNKNOWN else sheet.texts(column)
         if sheet is UNKNOWN or texts is UNKNOWN:
@@ -80,7 +80,7 @@ class TableReader:
         return tuple((text, sheet.sheet.where(row)) for row, text in enumerate(texts))
 
     def _column(self, wanted: TableColumn, column: Located[str], default: float | None) -> FloatArray | Unknown:
-        sheet = self.files.sheet(wanted)
+        sheet = self.files.sheet(wanted.file, wanted.where)
         numbers = UNKNOWN if sheet is UNKNOWN else sheet.numbers(column)
         rows = UNKNOWN if sheet is UNKNOWN else self._rows(wanted, sheet)
         if sheet is UNKNOWN or numbers is UNKNOWN or rows is UNKNOWN:

@@ -241,8 +241,11 @@ def read_edges(
     return table
 
 
-def read_sheet(named: NamedFile, where: tuple[Condition, ...], findings: Findings) -> Sheet | Unknown:
-    """A table whose columns have names, of the rows that count. Codes: those of ``read_data``, and ``file-format``,
+def read_sheet(
+    named: NamedFile, where: tuple[Condition, ...], findings: Findings, most: int | None = None
+) -> Sheet | Unknown:
+    """A table whose columns have names, of the rows that count: of at most so many rows, or as many as neurons may
+    have. Codes: those of ``read_data``, and ``file-format``,
     ``invalid-utf8``, ``too-large``, ``useless-key``."""
     if not named.inline and Path(named.path).suffix.lower() not in TABLE_FILES:
         message = f"'{_short(named.path)}' is no kind of file whose columns have names"
@@ -255,7 +258,7 @@ def read_sheet(named: NamedFile, where: tuple[Condition, ...], findings: Finding
     if data is UNKNOWN:
         return UNKNOWN
     try:
-        sheet = _sheet_in(data, named, where)
+        sheet = _sheet_in(data, named, where, most)
     except CellError as error:
         _refuse(error, named.called, named.span, findings)
         return UNKNOWN
@@ -283,12 +286,13 @@ def _sheet_in(data: bytes, named: NamedFile, where: tuple[Condition, ...], most:
     return parse_sheet(data, suffix, where, rows)
 
 
-def read_column(named: NamedFile, read: Callable[[], T], findings: Findings) -> T | Unknown:
-    """What is read of a column of a sheet; UNKNOWN where something of it is invalid, which is reported."""
+def read_column(named: NamedFile, read: Callable[[], T], findings: Findings, *, gaps: bool = True) -> T | Unknown:
+    """What is read of a column of a sheet, which may have ``gaps``; UNKNOWN where something of it is invalid, which is
+    reported."""
     try:
         return read()
     except CellError as error:
-        _refuse(error, named.called, named.span, findings)
+        _refuse(error, named.called, named.span, findings, gaps=gaps)
         return UNKNOWN
 
 
@@ -316,7 +320,7 @@ def _refuse(
             message, at = str(one), one.span or span
             if one.span is None:
                 message = f"{called}: {one}"
-            findings.error(one.code, at, message, hint, key=number)
+            findings.error(one.code, at, message, hint, key=(number, message))
         else:
             place = cell_at(shown, span.file, one.at) if any(one.at) else span
             findings.error(one.code, place, str(one), hint)
