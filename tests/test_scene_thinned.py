@@ -16,9 +16,9 @@ from scenes import scene_of
 
 import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.scene import plan
+from neurovis_spec.scene import teachers
 from neurovis_spec.scene.shown import Shown, shown
-from neurovis_spec.scene.teachers import fewer, teachers_of
+from neurovis_spec.scene.teachers import guides_of, teachers_of
 
 #: Two rings that two groups drive, each neuron all of them; the wires of the rings are the weak ones.
 RING = """
@@ -170,22 +170,30 @@ def test_where_nothing_is_kept_the_notes_say_so() -> None:
         )
 
 
-def test_of_many_dotted_lines_each_rule_keeps_some_and_the_rest_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A tenth of the lines that there may be: each takes a while to draw."""
-    most = plan._MOST_TEACHERS // 10
-    monkeypatch.setattr(plan, "_MOST_TEACHERS", most)
+def test_of_many_dotted_lines_there_is_one_a_signal_from_group_to_group(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a one-to-one signal of many one from the middle to the middle; of few each; of too many one each."""
     network = nv.compile_text(
         "neurovis: 1\nname: taught\nneurons: {A: {bias: 1}, T: {count: 15}, B: {count: 15}, G: {}, D: {count: 9}}\n"
         "connections:\n"
-        "  A -> B: {weight: 0.1, plasticity: {delta: {target: T}}}\n"
-        "  A -> D: {weight: 0.1, plasticity: {delta: {target: G}}}\n"
+        "  A -> B: {pattern: all_to_all, weight: 0.1, plasticity: {delta: {target: T}}}\n"
+        "  A -> D: {pattern: all_to_all, weight: 0.1, plasticity: {delta: {target: G}}}\n"
         "render: {labels: false}\nlayout: {engine: grid}\n"
     )
-    teachers = teachers_of(network.network)
-    kept = fewer(network.network, teachers, most)
-    names = network.network.neurons.names
-    assert Counter(names[one.source][0] for one in kept) == {"T": 11, "G": 9}
-    assert [one for one in teachers if one in set(kept)] == kept
+    guides, said = guides_of(network.network, teachers_of(network.network))
+    assert [one.count for one in guides] == [15, *(1,) * 9]
+    assert not said
     scene = scene_of(network, network.run(1).snapshot(0))
-    assert scene.notes == ("4 of 24 dotted lines of rules are left out",)
-    assert sum("signal" in group.data for group in scene.groups) == most
+    assert not scene.notes
+    lines = {group.data["signal"]: group for group in scene.groups if "signal" in group.data}
+    assert set(lines) == {"T -> B", *(f"G -> D{k}" for k in range(1, 10))}
+    assert lines["T -> B"].title == "T ⇢ B · 15\nT is the target of delta"
+    assert lines["T -> B"].data["count"] == "15"
+    assert "count" not in lines["G -> D1"].data
+    monkeypatch.setattr(teachers, "_MOST", 9)
+    guides, said = guides_of(network.network, teachers_of(network.network))
+    assert [(one.count, len(one.sources), len(one.targets)) for one in guides] == [(15, 15, 15), (9, 1, 9)]
+    assert not said
+    monkeypatch.setattr(teachers, "_MOST", 1)
+    guides, said = guides_of(network.network, teachers_of(network.network))
+    assert [one.count for one in guides] == [15]
+    assert said == ("1 of 2 dotted lines of rules are left out",)

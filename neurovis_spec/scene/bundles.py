@@ -2,8 +2,7 @@
 
 In: pathways of what is left out, where neurons, boxes and texts stand. Out: a Bundle for each: a band for what excites,
 one beside it for what inhibits, as both added up would hide either. They lie above lines and beneath neurons, each as
-wide as the root of its sum says. A band begins and ends at the hub of a group: its disc where it has one neuron, else
-the middle of its neurons, with its name where no box says it. Hubs of groups that stand among each other are apart.
+wide as the root of its sum says. A band begins and ends at the hub of a group, beside its name where no box says it.
 """
 
 from __future__ import annotations
@@ -15,12 +14,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
-from neurovis_spec.layout.model import Point
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.geometry import samples
+from neurovis_spec.scene.hubs import Hub, hubs_of
 from neurovis_spec.scene.lines import Line, trimmed
 from neurovis_spec.scene.model import Group, Shape, Spline, Text, Theme, ended
 from neurovis_spec.scene.obstacles import Obstacles
@@ -34,14 +33,8 @@ _WIDEST, _NARROWEST, _CROWD = 11.0, 1.8, 8
 _MOST = 2500
 #: How much of its colour there is in a band.
 _SHARE = 0.5
-#: Hubs are so far apart where their groups have room, as a share of the picture's shorter side and at least; how far
-#: bands keep from the middle of one that stands among others, and at most from that of one whose rim is free; and from
-#: a rim.
-_APART, _LEAST_APART, _HUB, _MOST_RIM, _AIR = 0.22, 84.0, 9.0, 44.0, 2.0
 #: Of the way between two hubs this is a band at least.
 _BETWEEN = 0.6
-#: What is nearer to the middle of a group than this share of its neurons, on either side, is not its rim.
-_RIM = 0.1
 #: How far a band bends to its right, as a share of its length; what bands beside each other keep between them.
 _BEND, _BESIDE = 0.14, 1.5
 #: How far a loop reaches from its hub, and how wide it opens.
@@ -124,72 +117,16 @@ def largest(left: Sequence[Pathway]) -> float:
     return max((abs(_finite(strand.total)) for one in left for strand in one.strands), default=0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class _Hub:
-    """Where bands of a group begin and end: so far from a point, or, where no other neuron is there, and it is not too
-    far away, at the rim of a rectangle around it."""
-
-    centre: Point
-    reach: float
-    rect: Rect | None = None
-
-    def rim(self, towards: Point) -> float:
-        """How far it reaches in a direction, a unit vector."""
-        if self.rect is None:
-            return self.reach
-        (x, y), (x0, y0, x1, y1) = self.centre, self.rect
-        ways = [
-            (high - at if way > 0 else at - low) / abs(way)
-            for at, way, low, high in ((x, towards[0], x0, x1), (y, towards[1], y0, y1))
-            if abs(way) > 1e-9
-        ]
-        return max(self.reach, min(*ways, _MOST_RIM) + _AIR)
-
-
-def _hubs(left: Sequence[Pathway], ground: Ground) -> dict[int, _Hub]:
+def _hubs(left: Sequence[Pathway], ground: Ground) -> dict[int, Hub]:
     """The hubs of all groups at which something begins or ends, by their numbers."""
-    groups, centres, (x0, y0, x1, y1) = ground.network.neurons.groups, ground.centres, ground.picture
+    groups = ground.network.neurons.groups
     found = {number for one in left for number in (one.source, one.target)}
     numbers = sorted(found, key=lambda number: groups[number].name)
     members = [np.asarray(groups[number].indices) for number in numbers]
-    middles = np.array([centres[own].mean(axis=0) for own in members])
-    low, high = (np.array([np.quantile(centres[own], rim, axis=0) for own in members]) for rim in (_RIM, 1 - _RIM))
-    at = _apart(middles, low, high, max(_LEAST_APART, _APART * min(x1 - x0, y1 - y0)))
-    hubs = {}
-    for number, own, (x, y) in zip(numbers, members, at.tolist(), strict=True):
-        if len(own) == 1:
-            hubs[number] = _Hub((x, y), float(ground.radii[own[0]]))
-        else:
-            hubs[number] = _Hub((x, y), _HUB, _alone(own, ground))
-    return hubs
+    return dict(zip(numbers, hubs_of(members, ground.centres, ground.radii, ground.picture), strict=True))
 
 
-def _alone(members: IntArray, ground: Ground) -> Rect | None:
-    """The rectangle around some neurons; None where others stand in it."""
-    discs = ground.radii[:, None]
-    low, high = ((ground.centres + side * discs)[members] for side in (-1, 1))
-    corner, opposite = low.min(axis=0), high.max(axis=0)
-    within = ((ground.centres > corner) & (ground.centres < opposite)).all(axis=1)
-    if int(within.sum()) > len(members):
-        return None
-    return float(corner[0]), float(corner[1]), float(opposite[0]), float(opposite[1])
-
-
-def _apart(places: FloatArray, low: FloatArray, high: FloatArray, least: float) -> FloatArray:
-    """Places that push each other off where they are closer than so, each in its own rectangle."""
-    count = len(places)
-    turn = 2.4 * np.arange(count)  # where two are in one place, each goes its own way
-    places = places + 1e-3 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    for _ in range(60):
-        away = places[:, None] - places[None]
-        far = np.hypot(away[..., 0], away[..., 1]) + np.eye(count)
-        push = np.clip(least - far, 0.0, None) * (1 - np.eye(count))
-        places = places + 0.25 * (away / far[..., None] * push[..., None]).sum(axis=1)
-        places = np.clip(places, low, high)
-    return places
-
-
-def _name(words: str, hub: _Hub, obstacles: Obstacles, theme: Theme) -> Text | None:
+def _name(words: str, hub: Hub, obstacles: Obstacles, theme: Theme) -> Text | None:
     """The name of a hub where it lies on no disc and no text, as near as can be; None where there is no such place."""
     wide = texts.width(words, _NAME, 600)
     for ring in range(int(_FAR / 6)):
@@ -208,7 +145,7 @@ def _finite(total: float) -> float:
     return total if math.isfinite(total) else 0.0
 
 
-def _drawn(left: Sequence[Pathway], hubs: Mapping[int, _Hub], picture: Rect) -> list[Bundle]:
+def _drawn(left: Sequence[Pathway], hubs: Mapping[int, Hub], picture: Rect) -> list[Bundle]:
     """The bundles, the widest first, so that none hides another."""
     widest, most = _WIDEST * min(1.0, (_CROWD / len(left)) ** 0.25), largest(left)
     routes: list[FloatArray] = []
@@ -238,7 +175,7 @@ def _width(strand: Strand, most: float, widest: float) -> float:
     return max(_NARROWEST, widest * math.sqrt(share))
 
 
-def _rims(a: _Hub, b: _Hub) -> tuple[float, float]:
+def _rims(a: Hub, b: Hub) -> tuple[float, float]:
     """How far a band keeps from the middles of its hubs."""
     (ax, ay), (bx, by) = a.centre, b.centre
     far = math.hypot(bx - ax, by - ay)
@@ -250,7 +187,7 @@ def _rims(a: _Hub, b: _Hub) -> tuple[float, float]:
     return fewer * rims[0], fewer * rims[1]
 
 
-def _arc(a: _Hub, b: _Hub, aside: float) -> FloatArray:
+def _arc(a: Hub, b: Hub, aside: float) -> FloatArray:
     """From hub to hub, bent to the right, and moved aside by so much."""
     start, end = np.array(a.centre), np.array(b.centre)
     along = end - start
@@ -261,7 +198,7 @@ def _arc(a: _Hub, b: _Hub, aside: float) -> FloatArray:
     return np.array([start + off, start + along / 3 + bend + off, start + along * 2 / 3 + bend + off, end + off])
 
 
-def _loop(hub: _Hub, picture: Rect, larger: float) -> FloatArray:
+def _loop(hub: Hub, picture: Rect, larger: float) -> FloatArray:
     """Out of a hub and back to it, away from the middle of the picture, but within it."""
     (x0, y0, x1, y1), (x, y) = picture, hub.centre
     size, angle = larger * (_LOOP + hub.reach), math.atan2(y - (y0 + y1) / 2, x - (x0 + x1) / 2)

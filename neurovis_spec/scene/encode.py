@@ -143,7 +143,7 @@ def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
         label, data = planned.labels[index], {"neuron": name}
         if states[index]:
             data["state"] = states[index]
-        if planned.between:  # bundles speak of groups
+        if planned.between:  # which speaks of groups
             data["group"] = planned.network.neurons.groups[groups_of[index]].name
         shapes: tuple[Shape, ...] = (disc,)
         if index in planned.sizes:

@@ -64,7 +64,7 @@ from neurovis_spec.scene.scaling import scaled, scaled_group
 from neurovis_spec.scene.shown import Shown, shown
 from neurovis_spec.scene.signals import Signals
 from neurovis_spec.scene.spots import beyond
-from neurovis_spec.scene.teachers import Teacher, dash, dotted, drawn_teachers, fewer, label_of, room_of
+from neurovis_spec.scene.teachers import Guide, dash, dotted, drawn_teachers, guides_of, hubs_between, label_of, room_of
 from neurovis_spec.scene.themes import theme_of, tints_of
 from neurovis_spec.scene.titles import Titled, elsewhere, in_one_place, outline
 
@@ -79,8 +79,6 @@ _FAR = 0.55
 _UNFOCUSED = 0.4
 #: a picture is made so wide at most to have its legend in one row, and its title in one line
 _ROOM = 840.0
-#: more dotted lines than this would not be quiet
-_MOST_TEACHERS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,8 +170,11 @@ def plan(
         beads=delays.beads(network, page.lines, RADIUS * frame.scale, theme),
         lesions=content.lesions,
         labels=tuple(raised(said.labels, content.sizes)),
-        back=(*_box_frames(page.boxes, frame, theme), *_dotted_groups(content, page, theme)),
-        between=_bundle_groups(network, page.bundles, theme, 0 if begin is None else begin.step),
+        back=(*_box_frames(page.boxes, frame, theme), *_dotted_groups(content, page, theme, many=False)),
+        between=(
+            *_bundle_groups(network, page.bundles, theme, 0 if begin is None else begin.step),
+            *_dotted_groups(content, page, theme, many=True),
+        ),
         front=(
             *(
                 Group(backed(text) if content.said else (text,), id=f"label:{entry}")
@@ -208,7 +209,7 @@ class _Content:
     #: the pathways of what is left out, the strongest first
     left: Sequence[Pathway]
     #: who has a dotted line to whom
-    teachers: Sequence[Teacher]
+    guides: Sequence[Guide]
     lesions: Lesions
     #: what the legend says of signals, and how lines end
     signals: str
@@ -236,7 +237,8 @@ def _content(
     rooms = _rooms(network, layout) if settings.labels else {}
     sides = {index: layout.labels[network.neurons.names[index]] for index in rooms}
     boxes = boxes_of(network, positions, routes, rooms)
-    teachers, notes = _dotted(drawn, seen)
+    teachers = [one for one in drawn_teachers(drawn) if seen.focus[one.source] and seen.focus[one.target]]
+    guides, few = guides_of(network, teachers)
     beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
     beside = [(index, reach) for index, reach in beside if index not in rooms]
     extent = _extent(positions, radii, routes, boxes, beside, rooms.values())
@@ -253,11 +255,11 @@ def _content(
         sides=sides,
         boxes=boxes,
         left=left,
-        teachers=teachers,
+        guides=guides,
         lesions=lesions,
         signals=signals,
         ends=ends,
-        notes=(*notes, *unsaid),
+        notes=(*seen.notes, *few, *unsaid),
         said=[words.beside(strand) for strand in drawn.strands or ()],
         extent=extent,
         near=near,
@@ -304,8 +306,9 @@ def _on_page(content: _Content, framed: _Framed, gains: Gains, layout: Layout, t
     obstacles = Obstacles(_dots(lines), [reaches[index] for index in kept], centres, radii)
     picture = framed.picture(len(content.notes))
     frames = [(box.members, _mapped(box.rect, frame)) for box in boxes]
-    around = [room_of(teacher, frames, picture) for teacher in content.teachers]
-    guides = dotted(content.teachers, partners_of(network), centres, RADIUS * frame.scale, obstacles, around)
+    around, radius = [room_of(guide, frames, picture) for guide in content.guides], RADIUS * frame.scale
+    hubs = hubs_between(content.guides, centres, radii, radius, picture)
+    guides = dotted(content.guides, partners_of(network), hubs, radius, obstacles, around)
     for points in _dots(guides):
         obstacles.add_line(points)
     for box in boxes:
@@ -376,16 +379,6 @@ def _ground(content: _Content, page: _OnPage) -> Ground:
         [box.members for box in boxes],
         outward(network, content.positions),
     )
-
-
-def _dotted(drawn: Gathered, seen: Shown) -> tuple[list[Teacher], tuple[str, ...]]:
-    """The pairs that get dotted lines, and all that the picture says of what it leaves out."""
-    teachers = [one for one in drawn_teachers(drawn) if seen.focus[one.source] and seen.focus[one.target]]
-    few = len(teachers) - _MOST_TEACHERS
-    if few <= 0:
-        return teachers, seen.notes
-    note = f"{few:,} of {len(teachers):,} dotted lines of rules are left out"
-    return fewer(drawn.network, teachers, _MOST_TEACHERS), (*seen.notes, note)
 
 
 def _in_user_units(made: Plan, unit: float) -> Plan:
@@ -564,7 +557,7 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
         contents = legend.Contents(
             signals=content.signals if len(network.connections) else None,
             learns=len(network.changing) > 0,
-            teaches=label_of(content.teachers) if content.teachers else "",
+            teaches=label_of([guide.first for guide in content.guides]) if content.guides else "",
             delays=delayed,
             lesions=bool(content.lesions),
             ends=content.ends,
@@ -717,15 +710,24 @@ def _bundle_groups(network: Network, left: bundles.Bundles, theme: Theme, step: 
     return (*(bundles.drawn(network, one, theme, step) for one in left.all), *names)
 
 
-def _dotted_groups(content: _Content, page: _OnPage, theme: Theme) -> list[Group]:
-    names = content.network.neurons.names
-    groups = []
-    for teacher, line in zip(content.teachers, page.guides, strict=True):
-        source, target = names[teacher.source], names[teacher.target]
-        taught_by = f"{source}.{teacher.state}" if teacher.state else source
-        words = f"{source} ⇢ {target}\n{taught_by} is the {teacher.signal} of {teacher.rule}"
+def _dotted_groups(content: _Content, page: _OnPage, theme: Theme, *, many: bool) -> list[Group]:
+    """The dotted lines of pairs, or those of ``many``."""
+    groups, neurons = [], content.network.neurons
+    group = [one.name for one in neurons.groups for _ in one.indices]
+    for guide, line in zip(content.guides, page.guides, strict=True):
+        if (guide.count > 1) is not many:
+            continue
+        first = guide.first
+        source, target = (
+            neurons.names[some[0]] if len(some) == 1 else group[some[0]] for some in (guide.sources, guide.targets)
+        )
+        count = f" · {guide.count:,}" if many else ""
+        taught_by = f"{source}.{first.state}" if first.state else source
+        words = f"{source} ⇢ {target}{count}\n{taught_by} is the {first.signal} of {first.rule}"
         width = 1.6 if line.head > 5 else 0.9
         head = Arrowhead(line.tip, line.direction, 0.8 * line.head, head_half_width(0.6, 0.8 * line.head), theme.muted)
         dots_ = Spline(line.points, theme.muted, width, dash(width))
-        groups.append(Group((dots_, head), f"signal:{source} -> {target}", {"signal": f"{source} -> {target}"}, words))
+        data = {"signal": f"{source} -> {target}"} | ({"count": str(guide.count)} if many else {})
+        which = f":{first.rule}.{first.signal}.{first.state}" if many else ""
+        groups.append(Group((dots_, head), f"signal:{source} -> {target}{which}", data, words))
     return groups

@@ -1,13 +1,13 @@
 """Who teaches whom: the signals of plasticity rules, as quiet dotted lines.
 
 In: a network's rules and where its neurons are. Out: a dotted spline from each neuron that is a signal of a rule to
-the neuron whose connections learn by it. Signals that come from inputs alone have no neuron to start from.
+the neuron whose connections learn by it; where there are many of a signal from one group to another, one from hub to
+hub for all of these. Signals that come from inputs alone have no neuron to start from.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,9 +18,13 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
 from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.geometry import sample
+from neurovis_spec.scene.hubs import Hub, hubs_of
 from neurovis_spec.scene.lines import Line, trimmed
 from neurovis_spec.scene.obstacles import Obstacles
 
+#: Of more pairs than this of a signal from one group to another there is one dotted line; where there would be more
+#: lines than can be quiet, one of each.
+_MANY, _MOST = 12, 200
 _BENDS = (0.0, *(side * bend for bend in (0.09, 0.18, 0.27, 0.36, 0.48, 0.6) for side in (1, -1)))
 
 
@@ -59,57 +63,108 @@ def drawn_teachers(drawn: Gathered) -> list[Teacher]:
     return [replace(one, source=a, target=b) for one, a, b in pairs if not glyph[a] and not glyph[b]]
 
 
-def fewer(network: Network, teachers: Sequence[Teacher], most: int) -> list[Teacher]:
-    """So many of the pairs, in the same order: in turn one of each signal of each rule from one group to another, by
-    the names of the neurons, so that each of these keeps as many as any."""
-    names, group = network.neurons.names, [group.name for group in network.neurons.groups for _ in group.indices]
-    turns: Counter[tuple[object, ...]] = Counter()
-    ranked: list[tuple[int, str, str, int]] = []
-    for source, target, place in sorted((names[one.source], names[one.target], k) for k, one in enumerate(teachers)):
-        one = teachers[place]
-        sort = one.rule, one.signal, group[one.source], group[one.target]
-        ranked.append((turns[sort], source, target, place))
-        turns[sort] += 1
-    return [teachers[place] for place in sorted(place for *_, place in sorted(ranked)[:most])]
+@dataclass(frozen=True, slots=True)
+class Guide:
+    """A dotted line: of a pair, or of all ``count`` pairs of a signal of a rule from one group to another: of which the
+    first one, and the neurons at either end, ascending."""
+
+    first: Teacher
+    sources: tuple[int, ...]
+    targets: tuple[int, ...]
+    count: int = 1
+
+    @property
+    def ends(self) -> tuple[int, ...]:
+        """All neurons at its ends."""
+        return (*self.sources, *self.targets)
 
 
-def room_of(teacher: Teacher, frames: Iterable[tuple[Collection[int], Rect]], picture: Rect) -> Rect:
-    """Where the dotted line of a pair may run: in the smallest frame that holds both neurons, else in the picture."""
-    around = [rect for members, rect in frames if teacher.source in members and teacher.target in members]
+def guides_of(network: Network, teachers: Sequence[Teacher]) -> tuple[list[Guide], tuple[str, ...]]:
+    """The dotted lines of pairs, in the order of these; and what the picture says where there are too many."""
+    group = [group.name for group in network.neurons.groups for _ in group.indices]
+    alike: dict[tuple[str, ...], list[Teacher]] = {}
+    for one in teachers:
+        alike.setdefault((one.rule, one.signal, one.state, group[one.source], group[one.target]), []).append(one)
+    few = sum(len(pairs) if len(pairs) <= _MANY else 1 for pairs in alike.values())
+    most = _MANY if few <= _MOST else 1
+    guides = [guide for pairs in alike.values() for guide in (_each(pairs) if len(pairs) <= most else [_all(pairs)])]
+    place = {one: number for number, one in enumerate(teachers)}
+    if len(guides) <= _MOST:
+        return sorted(guides, key=lambda guide: place[guide.first]), ()
+    names = network.neurons.names
+    ordered = sorted(guides, key=lambda one: (-one.count, names[one.first.source], names[one.first.target]))[:_MOST]
+    said = f"{len(guides) - _MOST:,} of {len(guides):,} dotted lines of rules are left out"
+    return sorted(ordered, key=lambda guide: place[guide.first]), (said,)
+
+
+def _each(pairs: Sequence[Teacher]) -> list[Guide]:
+    """A dotted line for each."""
+    return [Guide(one, (one.source,), (one.target,)) for one in pairs]
+
+
+def _all(pairs: Sequence[Teacher]) -> Guide:
+    """One for all."""
+    sources, targets = {one.source for one in pairs}, {one.target for one in pairs}
+    return Guide(pairs[0], tuple(sorted(sources)), tuple(sorted(targets)), len(pairs))
+
+
+def hubs_between(
+    guides: Sequence[Guide], centres: FloatArray, radii: FloatArray, radius: float, picture: Rect
+) -> list[tuple[Hub, Hub]]:
+    """Where dotted lines begin and end: at the discs of pairs, of which each has a ``radius``, else at hubs."""
+    ends = [end for guide in guides for end in (guide.sources, guide.targets)]
+    several = iter(hubs_of([np.array(end) for end in ends if len(end) > 1], centres, radii, picture))
+    each = [next(several) if len(end) > 1 else Hub(tuple(centres[end[0]].tolist()), radius) for end in ends]
+    return list(zip(each[::2], each[1::2], strict=True))
+
+
+def room_of(guide: Guide, frames: Iterable[tuple[Collection[int], Rect]], picture: Rect) -> Rect:
+    """Where a dotted line may run: in the smallest frame that holds all neurons at its ends, else in the picture."""
+    around = [rect for members, rect in frames if set(guide.ends) <= set(members)]
     return min(around, key=lambda rect: (rect[2] - rect[0]) * (rect[3] - rect[1]), default=picture)
 
 
 def dotted(
-    teachers: Sequence[Teacher],
+    guides: Sequence[Guide],
     images: Mapping[int, int],
-    centres: FloatArray,
+    hubs: Sequence[tuple[Hub, Hub]],
     radius: float,
     obstacles: Obstacles,
     rooms: Sequence[Rect],
 ) -> list[Line]:
-    """The dotted lines of pairs, between discs of a ``radius``: straight, or bent where they would run over a disc or
-    along other lines, but never out of their ``rooms``; between mirror ``images`` mirrored, by what both would run
-    over."""
-    number = {(teacher.source, teacher.target): i for i, teacher in enumerate(teachers)}
+    """The dotted lines between ``hubs``, as between discs of a ``radius``: straight, or bent where they would run over
+    a disc or along other lines, but never out of their ``rooms``; between mirror ``images`` mirrored, by what both
+    would run over."""
+    number = {(guide.sources, guide.targets): i for i, guide in enumerate(guides)}
     found: dict[int, Line] = {}
-    for i, teacher in enumerate(teachers):
+    for i, guide in enumerate(guides):
         if i in found:
             continue
-        image = number.get((images.get(teacher.source, -1), images.get(teacher.target, -1)), i)
+        mirrored = (tuple(sorted(images.get(one, -1) for one in some)) for some in (guide.sources, guide.targets))
+        image = number.get((next(mirrored), next(mirrored)), i)
         best: tuple[float, dict[int, Line]] | None = None
         for bend in _BENDS:
             cost, lines = 4 * abs(bend), dict[int, Line]()
             for k, side in {image: -1, i: 1}.items():
-                ends = (teachers[k].source, teachers[k].target)
-                start, end = centres[ends[0]], centres[ends[1]]
-                (lines[k],) = trimmed([_bent(start, end, side * bend)], radius, radius, air=1.0)
-                dots = sample(lines[k].points, max(8, int(math.dist(start, end) / 6)))
+                lines[k] = _line(hubs[k], radius, side * bend)
+                (ax, ay), (bx, by) = (hub.centre for hub in hubs[k])
+                dots = sample(lines[k].points, max(8, int(math.dist((ax, ay), (bx, by)) / 6)))
                 out = bend and not _within(dots, rooms[k])
-                cost += math.inf if out else obstacles.path_hits(dots[2:-2], ends)
+                cost += math.inf if out else obstacles.path_hits(dots[2:-2], guides[k].ends)
             if best is None or cost < best[0]:
                 best = (cost, lines)
         found |= best[1] if best is not None else {}
-    return [found[i] for i in range(len(teachers))]
+    return [found[i] for i in range(len(guides))]
+
+
+def _line(hubs: tuple[Hub, Hub], radius: float, bend: float) -> Line:
+    """The dotted line from hub to hub with this bend."""
+    start, end = (np.array(hub.centre) for hub in hubs)
+    along, far = end - start, math.dist(hubs[0].centre, hubs[1].centre)
+    x, y = (along / far).tolist() if far > 0 else (1.0, 0.0)
+    rims = np.array([[hubs[0].rim((x, y)), hubs[1].rim((-x, -y))]])
+    (line,) = trimmed([_bent(start, end, bend)], rims, radius, air=1.0)
+    return line
 
 
 def _within(dots: FloatArray, room: Rect) -> bool:

@@ -81,7 +81,7 @@ export class Drawing {
     );
     /** @type {Group[]} */
     this.back = [];
-    /** what stands for lines that are left out @type {Group[]} */
+    /** what stands for many lines @type {Group[]} */
     this.bundles = [];
     /** @type {Group[]} */
     this.front = [];
@@ -272,8 +272,10 @@ export class Drawing {
         beads.length || this.bundles.length
           ? this.picture(camera, [], (context) => {
               draw(context, beads);
-              context.globalAlpha = near.size ? RECEDING : 1;
-              for (const { shapes } of this.bundles) for (const shape of shapes) this.shape(context, shape);
+              for (const { id, shapes } of this.bundles) {
+                context.globalAlpha = !near.size || near.has(id) ? 1 : RECEDING;
+                for (const shape of shapes) this.shape(context, shape);
+              }
             })
           : null,
       words: this.picture(camera, words),
