@@ -9,6 +9,7 @@ from neurovis_layouts.layered import component_layout, hierarchy
 from neurovis_layouts.layered.compact import RANKS, WHOLE, Shape
 from neurovis_layouts.layered.levels import Levels
 from neurovis_layouts.layered.order import Order, ordered
+from neurovis_layouts.layered.page_cost import PageCost
 from neurovis_layouts.layered.templates import Book
 
 import neurovis_spec as nv
@@ -108,3 +109,24 @@ render: {{size: [{wide}, {high}]}}
     layout = nv.compile_text(text).layout()
     xs, ys = zip(*layout.positions.values(), strict=True)
     assert (max(xs) - min(xs) > max(ys) - min(ys)) == (wide > high)
+
+
+def test_instances_that_nothing_connects_stand_in_rows() -> None:
+    layout = nv.compile_text(f"{FAN.partition('neurons: {R')[0].replace('COUNT', '24')}").layout()
+    xs, ys = zip(*layout.positions.values(), strict=True)
+    assert max(xs) - min(xs) + 1 < 2.5 * (max(ys) - min(ys) + 1)
+
+
+def test_a_page_costs_its_size_its_proportions_and_what_is_hard_to_follow_on_it(problem: LayoutProblem) -> None:
+    square = [(0.0, 0.0), (12.0, 0.0), (0.0, 9.0), (12.0, 9.0)]
+    page = (0.0, 0.0, 12.0, 9.0)  # of 4:3
+    plain, crossed = PageCost(problem, [(0, 2), (1, 3)], True), PageCost(problem, [(0, 3), (1, 2)], True)
+    assert plain(square, page) < crossed(square, page)
+    assert plain(square, page) < plain(square, (0.0, 0.0, 12.0, 18.0))
+    # as large, and with as much line, but too high
+    assert plain(square, page) < plain(square, (0.0, 0.0, 6.0, 18.0))
+    back = PageCost(problem, [(0, 2), (3, 1)], True)
+    assert plain(square, page) < back(square, page)
+    free, through = PageCost(problem, [(0, 2)], False), [(0.0, 0.0), (12.0, 0.0), (0.0, 9.0), (0.0, 4.0)]
+    assert free(square, page) < free(through, page)
+    assert plain([(12.0 - x, y) for x, y in square], page) == plain(square, page)

@@ -27,54 +27,30 @@ def _always(_: object) -> bool:
     return True
 
 
-def _paired(found: Component) -> object:
-    return found.part.pair
-
-
-def _unpaired(found: Component) -> object:
-    return not found.part.pair
-
-
-def _in_folds(found: Component) -> object:
-    return found.folds.ranks
-
-
-def _in_columns(found: Component) -> object:
-    return found.columns
-
-
-def _plain(found: Component) -> object:
-    return found.partner is None and not found.columns
-
-
-def _with_guests(found: Component) -> object:
-    return found.part.guests
-
-
-#: A component that has its ranks.
+#: A component for which one way of cutting loops is chosen: its ranks, the order in these, and places.
 RANKS: Phases[Component] = (
-    (components.with_axis, _paired),
+    (components.with_axis, lambda found: found.part.pair),
     (components.with_folds, _always),
 )
 ORDER: Phases[Component] = (
     (components.with_levels, _always),
-    (components.with_rows_interleaved, _in_folds),
-    (components.with_spines, _in_columns),
-    (components.in_order, _unpaired),
-    (components.in_symmetric_order, _paired),
-    (components.with_straight_columns, _in_columns),
+    (components.with_rows_interleaved, lambda found: found.folds.ranks),
+    (components.with_spines, lambda found: found.columns),
+    (components.in_order, lambda found: not found.part.pair),
+    (components.in_symmetric_order, lambda found: found.part.pair),
+    (components.with_straight_columns, lambda found: found.columns),
     (components.with_crossings, _always),
-    (components.with_columns_tied, _in_columns),
+    (components.with_columns_tied, lambda found: found.columns),
 )
 PLACES: Phases[Component] = (
     (components.with_reflections, _always),
     (components.with_labels_at_ends, _always),
     (components.with_places, _always),
-    (components.with_staggered_ranks, _plain),
-    (components.with_guests_drawn_in, _with_guests),
+    (components.with_staggered_ranks, lambda found: not (found.partner or found.columns)),
+    (components.with_guests_drawn_in, lambda found: found.part.guests),
     (components.with_neurons, _always),
     (components.with_waypoints, _always),
-    (components.in_bands, _unpaired),
+    (components.in_bands, lambda found: not found.part.pair),
     (components.with_labels, _always),
 )
 

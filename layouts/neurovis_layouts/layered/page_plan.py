@@ -7,22 +7,19 @@ cell names is placed behind the cell that it has most connections with. Mirror i
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-import numpy as np
-
 from neurovis_layouts.alike import Move, shifted_by
 from neurovis_layouts.frame import from_picture, to_picture
-from neurovis_layouts.layered.compact import crossings, run_over, stretched, unrelated
 from neurovis_layouts.layered.drawing import Drawing, Piece
+from neurovis_layouts.layered.page_cost import PageCost
 from neurovis_layouts.layered.parts import Part, imaged, part_of_module, symmetric
 from neurovis_layouts.layered.plan_places import Slot, placed
-from neurovis_spec.layout.geometry import Rect, lengths, united
+from neurovis_spec.layout.geometry import Rect, united
 from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point, Seat
 
 #: A part drawn in a direction, with the frame around it.
@@ -31,14 +28,6 @@ Drawn = Callable[[Part, Direction], Piece]
 _Members: TypeAlias = tuple[int, ...]
 #: Rounds in which each part may turn to face the others; after the second hardly any does.
 _ROUNDS = 3
-#: What it costs, in units of the layout, that the side of the page is a unit longer (with 2: the hexapod takes twice
-#: the area where ranks are farther apart), and to cross a line or to run over a disc.
-_SIDE, _CROSSING = 10.0, 4.0
-#: What all crossings cost at most, by the length of all lines: layers that are fully connected face each other, though
-#: they cross less where one is turned away.
-_CROSSED = 2.0
-#: What is no longer than this, in units of the layout, may have any proportions.
-_SMALL = 8.0
 _DIRECTIONS: tuple[Direction, ...] = ("down", "up", "right", "left")
 #: A difference that is rounding.
 _NOTHING = 1e-9
@@ -188,9 +177,9 @@ class _Page:
         self._problem, self._parts, self._slots, self._pair = problem, parts, slots, pair
         self._sketched, self._upright = sketched, upright
         owner = {m: k for k, part in enumerate(parts) for m in part.members}
-        #: the connections from part to part, and every two of them that have no end in common
-        self._between = [(e.source, e.target) for e in problem.edges if owner[e.source] != owner[e.target]]
-        self._apart = unrelated(self._between)
+        between = [(e.source, e.target) for e in problem.edges if owner[e.source] != owner[e.target]]
+        # from part to part all ways are as good
+        self._page_cost = PageCost(problem, between, directed=False)
         #: parts that are copies of each other
         makes: dict[tuple[int, int], list[int]] = {}
         for k, part in enumerate(parts):
@@ -254,20 +243,12 @@ class _Page:
         return self._costs[shape]
 
     def _cost_of(self, shape: _Shape) -> float:
-        """How large the page is, how long straight lines between the ends of connections from part to part are
-        together, how often they cross and run over discs, and how far the whole page is from its proportions."""
         moved = self.stood(shape, self._sketched)
         at: dict[int, Point] = {}
         for piece, move in moved:
             at.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
-        x0, y0, x1, y1 = united(move.rect(piece.rect) for piece, move in moved)
-        wide, high = (x1 - x0, y1 - y0) if self._problem.direction in ("down", "up") else (y1 - y0, x1 - x0)
-        lines = np.array([(at[a], at[b]) for a, b in self._between], dtype=np.float64).reshape(-1, 2, 2)
-        length = float(lengths(lines[:, 1] - lines[:, 0]).sum())
-        met = min(_CROSSING * crossings(lines, *self._apart), _CROSSED * length)
-        met += _CROSSING * run_over(lines, np.array([at[i] for i in range(len(at))]))
-        page = math.sqrt(stretched(self._problem, wide, high)) if max(wide, high) > _SMALL else 1.0
-        return (_SIDE * math.sqrt(wide * high) + length + met) * page
+        places = [at[i] for i in range(len(at))]
+        return self._page_cost(places, united(move.rect(piece.rect) for piece, move in moved))
 
 
 def _directions(problem: LayoutProblem, part: Part, pair: Mapping[int, int], drawn: Drawn) -> tuple[Direction, ...]:
