@@ -45,8 +45,8 @@ from neurovis_spec.language.format.canonical import format_read
 from neurovis_spec.live.saving import recording as saved
 from neurovis_spec.live.saving import told_by
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import SourceError, Turned
-from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn
+from neurovis_spec.live.source import SourceError
+from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned
 from neurovis_spec.runtime.backend import load
 from neurovis_spec.runtime.recording import Recording
 

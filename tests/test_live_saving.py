@@ -20,8 +20,8 @@ import neurovis_spec as nv
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.saving import film, picture, recording, steps_for, told_by
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import SourceError, Turned
-from neurovis_spec.live.turns import Hold, Learn, Lesion, Mend, Release, Set, Turn
+from neurovis_spec.live.source import SourceError
+from neurovis_spec.live.turns import Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned
 from neurovis_spec.live.view import view_of
 from neurovis_spec.runtime.recording import Recording
 

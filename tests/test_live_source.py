@@ -13,8 +13,8 @@ from neurovis_spec.live.carry import carried
 from neurovis_spec.live.past import EVERY, Kept, Past
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import Reach, Seen, SourceError, Turned
-from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, rules
+from neurovis_spec.live.source import Reach, Seen, SourceError
+from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, rules
 from neurovis_spec.scene.fading import Fading, snapshots_of
 
 SPEC = """neurovis: 1

@@ -176,7 +176,41 @@ def test_it_jumps_to_events_which_are_marked_as_turns_are(tmp_path: Path) -> Non
     asyncio.run(main())
 
 
-def test_a_branch_forgets_what_came_after(tmp_path: Path) -> None:
+def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp_path: Path) -> None:
+    """Without a click the output, its target and the error; back, a lesion, on again; and back to how it was."""
+
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path, curves=True) as (opened, compiled, _):
+            await opened.ask("speed = document.querySelector('#speed'); speed.value = '16'; speed.onchange()")
+            await opened.until(f"{STEP} > 400")
+            last = await pause(opened)
+            went = "', behind it how it went before'"
+            assert not await opened.ask(f"{TRACE.format(0)}.includes({went})")
+            await opened.ask(f"{SCRUB}.value = 150; {SCRUB}.dispatchEvent(new Event('input'))")
+            await opened.until(f"{STEP} == 150")
+            x, y = places(compiled)["K3"]
+            await opened.click(x, y)
+            await told(opened, "K3")
+            await opened.key("t")
+            await opened.ask("document.querySelector('#lesion').click()")
+            await opened.until("document.querySelector('#others').children.length == 1")
+            words = await opened.ask("document.querySelector('#others button').textContent")
+            assert words == f"from step 151 to {last}: as it went"
+            await opened.key(" ")
+            await opened.until(f"{STEP} > {last - 40} && {TRACE.format(0)}?.includes({went})")
+            now = await pause(opened)
+            await opened.ask("document.querySelector('#others button').click()")
+            words = f"from step 151 to {now}: step 151: lesion K3"
+            await opened.until(f"document.querySelector('#others button').textContent == '{words}'")
+            run = compiled.run(last + 1)
+            await opened.until(f"{STEP} == {now}")
+            value = float(str(await opened.ask("document.querySelector('.now').textContent")).replace("−", "-"))
+            assert value == pytest.approx(run["O"][now], rel=1e-5)
+
+    asyncio.run(main())
+
+
+def test_a_branch_goes_on_from_the_step_that_is_shown(tmp_path: Path) -> None:
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
             await opened.key("]")

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import neurovis_spec
-from neurovis_spec.live.source import SourceError, Turned
-from neurovis_spec.live.turns import TURNS, Feed, Hold, Learn, Lesion, Mend, Set
+from neurovis_spec.live.source import SourceError
+from neurovis_spec.live.turns import TURNS, Feed, Hold, Learn, Lesion, Mend, Set, Turned
 from neurovis_spec.ros.middleware import Node
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.ros.steering import RunSteering, ViewSteering

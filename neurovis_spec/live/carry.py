@@ -21,8 +21,8 @@ from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Projection
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import SourceError, Turned
-from neurovis_spec.live.turns import Feed, turn
+from neurovis_spec.live.source import SourceError
+from neurovis_spec.live.turns import Feed, Turned, turn
 from neurovis_spec.runtime.controls import lose
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.simulation import ParameterError, Simulation

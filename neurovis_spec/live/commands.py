@@ -91,7 +91,14 @@ class Restart:
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """From here on differently: what came after is forgotten."""
+    """From here on differently: what came after is another future."""
+
+
+@dataclass(frozen=True, slots=True)
+class Switch:
+    """To another future, by its number."""
+
+    number: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +120,7 @@ class Draw:
     appearance: Appearance
 
 
-Command: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Restart | Branch | Speed | Turn
+Command: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Restart | Branch | Switch | Speed | Turn
 
 
 #: Where what was put by hand is written: into ``layout.positions`` of the spec, or into the layout file that the spec

@@ -8,6 +8,7 @@ changes may be wrong for one picture.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 from typing import Final, Literal, Protocol, TypeAlias
 
@@ -124,6 +125,38 @@ class Ring:
             row[:n], row[n:known] = activity, weights
             row[known:] = np.nan if quantities is None else quantities
         self._last = step
+
+    @property
+    def size(self) -> int:
+        """The bytes that it takes."""
+        return int(self._values.nbytes)
+
+    def copy(self) -> Ring:
+        """The same, which goes on by itself."""
+        made = copy(self)
+        made._values = self._values.copy()
+        return made
+
+    def after(self, step: int) -> Ring:
+        """The steps after this one alone, in no more room than they take."""
+        first = max(self._first, step + 1)
+        steps, made = np.arange(first, self._last + 1), copy(self)
+        made._size, made._first = max(1, len(steps)), first
+        made._values = np.empty((made._size, self._values.shape[1]), np.float32)
+        made._values[steps % made._size] = self._values[steps % self._size]
+        return made
+
+    def go_on(self, later: Ring) -> None:
+        """Have these steps follow, in place of all that came after the step before the first of them."""
+        steps = np.arange(max(later._first, later._last + 1 + _NEXT - self._size), later._last + 1)
+        if not len(steps):
+            return
+        self.cut(int(steps[0]) - 1)
+        if self._last != steps[0] - 1:  # what is between is not known
+            self._first = int(steps[0])
+        self._values[steps % self._size] = later._values[steps % later._size]
+        self._last = int(steps[-1])
+        self._first = max(self._first, self._last + 1 + _NEXT - self._size)
 
     def cut(self, step: int) -> None:
         """Forget what came after a step."""

@@ -21,8 +21,10 @@ import numpy.typing as npt
 
 from neurovis_spec.live.commands import Request
 from neurovis_spec.live.desk import Desk
-from neurovis_spec.live.history import Bins
+from neurovis_spec.live.history import Bins, History
 from neurovis_spec.live.protocol import (
+    LEFT,
+    TRACE,
     LookAt,
     Trace,
     acknowledged,
@@ -171,13 +173,16 @@ class Hub:
         client, self._reader = self._waiting.popleft(), None
         wanted, client.wanted = client.wanted, None
         if client in self._clients and shown is not None and wanted is not None:
-            traces = {}
-            for item in wanted.items:
-                members = shown.view.members(item)
-                if members is not None:
-                    traces[shown.view.place(item)] = shown.history.read(members, wanted.bins)
+            found = {item: shown.view.members(item) for item in wanted.items}
+            items = {shown.view.place(item): members for item, members in found.items() if members is not None}
+
+            def read(history: History, kind: int) -> bytes:
+                traces = {place: history.read(members, wanted.bins) for place, members in items.items()}
+                return trace_message(self._version, traces, wanted.bins, kind)
+
             client.traces = (
-                trace_message(self._version, traces, wanted.bins),
+                *(() if shown.left is None else (read(shown.left, LEFT),)),
+                read(shown.history, TRACE),
                 *(self._raster(shown, item, wanted.bins) for item in wanted.rasters),
             )
             client.wake.set()

@@ -87,11 +87,21 @@ class Past:
             self._taken -= self._kept.pop(0).size
             self._steps.pop(0)
 
+    def copy(self) -> Past:
+        """The same, which goes on by itself."""
+        made = Past(self._room)
+        made._taken, made._steps, made._kept = self._taken, self._steps.copy(), self._kept.copy()
+        return made
+
     def cut(self, k: int) -> None:
         """Forget the states after step k."""
         while self._steps and self._steps[-1] > k:
             self._steps.pop()
             self._taken -= self._kept.pop().size
+
+    def after(self, k: int) -> tuple[Kept, ...]:
+        """The states of steps after k."""
+        return tuple(self._kept[bisect_right(self._steps, k) :])
 
     def before(self, k: int) -> Kept | None:
         """The latest state at or before step k."""

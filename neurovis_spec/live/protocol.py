@@ -38,20 +38,22 @@ from neurovis_spec.live.commands import (
     Seek,
     Speed,
     Step,
+    Switch,
     Unplace,
     Write,
 )
 from neurovis_spec.live.drawing import Moved
+from neurovis_spec.live.futures import Future
 from neurovis_spec.live.history import Bins, Range
 from neurovis_spec.live.run import Status
 from neurovis_spec.live.saving import MOST_SECONDS
-from neurovis_spec.live.source import Drawn, Reach, Turned
-from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set
+from neurovis_spec.live.source import Drawn, Reach
+from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turned
 from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
-SCENE, FRAME, TRACE, FILE, RASTER = 1, 2, 3, 4, 5
+SCENE, FRAME, TRACE, FILE, RASTER, LEFT = 1, 2, 3, 4, 5, 6
 #: kind, scene
 _SCENE_HEAD = struct.Struct("<BxH")
 #: kind, scene, serial, changed, step, first, last, bytes of the caption, numbers of the pose
@@ -79,6 +81,8 @@ _GAINS = ("activity", "signal", "thickness", "change")
 _TRACED, _RASTERS, _BINS, _EVERY = 24, 8, 2048, 1 << 32
 #: The most turns and events that are listed, the latest turns and the first events.
 _LISTED = 1000
+#: The most turns by which a future is called.
+_SAID = 4
 #: The most steps that are made at once.
 _NEAR = 64
 
@@ -131,6 +135,7 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         events=list(status.events[:_LISTED]),
         appearance=asdict(status.appearance),
         backend=status.backend,
+        futures=[_future(one) for one in status.futures],
     )
 
 
@@ -141,6 +146,13 @@ def body_message(body: Drawn) -> str:
     if skeleton is None or skeleton.size > _POSED:
         return _text("body", skeleton=None, start=[0.0, 0.0])
     return _text("body", skeleton=json.loads(text_of(skeleton)), start=list(body.start))
+
+
+def _future(future: Future) -> dict[str, object]:
+    """A future, with what was turned in it since it went on differently, and those within it."""
+    own = [_turned(entry) for entry in future.turned if entry.step >= future.at]
+    within = [_future(one) for one in future.within]
+    return {"number": future.number, "at": future.at, "last": future.last, "turned": own[:_SAID], "within": within}
 
 
 def _turned(entry: Turned) -> dict[str, object]:
@@ -154,10 +166,11 @@ def values_message(step: int, values: Mapping[str, float]) -> str:
     return _text("values", step=step, values=known)
 
 
-def trace_message(version: int, traces: Mapping[tuple[int, int], Range], bins: Bins) -> bytes:
+def trace_message(version: int, traces: Mapping[tuple[int, int], Range], bins: Bins, kind: int = TRACE) -> bytes:
     """Traces of items (connections, then neurons), each with what of it that is: 0 its activity or weight, else the
-    number of a name in the list that the scene has for it, from 1 on. The least and the largest value of each bin."""
-    head = _TRACE_HEAD.pack(TRACE, version, len(traces), bins.first, bins.every, bins.count)
+    number of a name in the list that the scene has for it, from 1 on. The least and the largest value of each bin. Of
+    the ``kind`` LEFT they are those of the future that was left last."""
+    head = _TRACE_HEAD.pack(kind, version, len(traces), bins.first, bins.every, bins.count)
     items = np.array(list(traces), "<u4").reshape(-1, 2).T
     return b"".join([head, items.tobytes(), *(trace.astype("<f4").tobytes() for trace in traces.values())])
 
@@ -392,6 +405,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "event": ({"by": _whole(-1, 1)}, Event),
     "restart": ({}, Restart),
     "branch": ({}, Branch),
+    "switch": ({"number": _whole(0, _MOST)}, Switch),
     "draw": ({"theme": _theme, **dict.fromkeys(_GAINS, _factor), "pathways": _truth}, _draw),
     "speed": ({"value": _speed}, Speed),
     "set": ({"values": _values, "moving": _truth}, Set),

@@ -14,9 +14,10 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SPIKE
+from neurovis_spec.live.futures import Futures
 from neurovis_spec.live.history import Recorded
-from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, drawn, recalled
-from neurovis_spec.live.turns import Turn
+from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, drawn, recalled
+from neurovis_spec.live.turns import Turn, Turned
 from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.errors import RecordingError
@@ -35,6 +36,7 @@ class RecordedSource:
     an empty one."""
 
     capabilities = Capabilities(ends=True)
+    futures = Futures()
 
     def __init__(self, network: Network, recording: Recording) -> None:
         self.network, self._recording = network, fitted(recording, network)
@@ -176,6 +178,10 @@ class RecordedSource:
     def branch(self) -> None:
         """Raises SourceError: a recording stays as it is."""
         raise SourceError("a recording cannot go on differently: run the spec")
+
+    def switch(self, number: int) -> None:
+        """Raises SourceError: there is no other future."""
+        raise SourceError("a recording has no other future: run the spec")
 
     def turn(self, turn: Turn) -> None:
         """Raises SourceError: a recording stays as it is."""

@@ -31,9 +31,12 @@ from neurovis_spec.live.commands import (
     Seek,
     Speed,
     Step,
+    Switch,
 )
+from neurovis_spec.live.futures import Future
 from neurovis_spec.live.history import History
-from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, Source, SourceError, Turned
+from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, Source, SourceError
+from neurovis_spec.live.turns import Turned
 from neurovis_spec.live.view import Glance, View
 
 _LOG: Final = logging.getLogger(__name__)
@@ -43,7 +46,8 @@ P = ParamSpec("P")
 @dataclass(frozen=True, slots=True)
 class Status:
     """What a client is told of a run when it changes: ``ended`` where there is no further step; ``events``, the steps
-    at which the spec has some; ``backend``, what makes the steps, "" where that is not known."""
+    at which the spec has some; ``backend``, what makes the steps, "" where that is not known;
+    ``futures``, what else the run has done behind steps of its past."""
 
     playing: bool
     speed: float
@@ -56,6 +60,7 @@ class Status:
     events: tuple[int, ...]
     appearance: Appearance
     backend: str
+    futures: tuple[Future, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +73,8 @@ class Shown:
     reach: Reach
     status: Status
     history: History
+    #: that of the future that was left last, and what it has since the run goes on differently
+    left: History | None
     body: Drawn
     quantities: FloatArray | None
 
@@ -245,6 +252,10 @@ class Run:
                 self._clock.start(now)
             case Branch():
                 source.branch()
+            case Switch():
+                source.switch(asked.number)
+                self._target, self._ended = None, False
+                self._clock.start(now)
             case Draw():
                 self.appearance = asked.appearance
                 self._redraw(refuse)
@@ -372,7 +383,10 @@ class Run:
             events=self._events(),
             appearance=self.appearance,
             backend=source.backend,
+            futures=source.futures.all,
         )
         seen = source.seen()
         glance, reach = self._view.glance(seen), source.reach
-        return Shown(self._view, seen, glance, reach, status, source.history, source.body, source.quantities)
+        left = source.futures.left
+        before = None if left is None else left.history
+        return Shown(self._view, seen, glance, reach, status, source.history, before, source.body, source.quantities)

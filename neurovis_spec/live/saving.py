@@ -19,8 +19,8 @@ from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.tree import Number
-from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen, Source, Turned
-from neurovis_spec.live.turns import Lesion, Mend, Set
+from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen, Source
+from neurovis_spec.live.turns import Lesion, Mend, Set, Turned
 from neurovis_spec.live.view import View
 from neurovis_spec.runtime.columns import Numbers, Probe, columns_of, recording_of
 from neurovis_spec.runtime.fitting import with_spikes

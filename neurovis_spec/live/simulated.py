@@ -22,9 +22,10 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.futures import Future, Futures
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
-from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, drawn, recalled
+from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, drawn, recalled
 from neurovis_spec.live.turns import (
     TURNS,
     Feed,
@@ -33,6 +34,7 @@ from neurovis_spec.live.turns import (
     Mend,
     Set,
     Turn,
+    Turned,
     carried_out,
     fed_by,
     rules,
@@ -55,7 +57,7 @@ class SimulatedSource:
     """A network that runs; it stands at the first step to be computed: step 0, or that of ``begin``, a state in which
     ``turned`` has had its effect and inputs are ``fed``. ``origin`` is where it begins anew."""
 
-    capabilities = Capabilities(TURNS | {"branch"})
+    capabilities = Capabilities(TURNS | {"branch", "switch"})
 
     def __init__(
         self,
@@ -77,6 +79,8 @@ class SimulatedSource:
         self.quantities: FloatArray | None = None
         self._signals.follow(simulation)
         self._origin = simulation.state() if origin is None else origin
+        #: the other futures of this run
+        self.futures = Futures()
         self._begin(self._origin if begin is None else begin, turned, fed or {})
         self.body = drawn(simulation.skeleton, tuple(simulation.sensors), self._seen.snapshot.pose)
 
@@ -232,24 +236,69 @@ class SimulatedSource:
         self._check_going()
         with self._whole():
             kept = self._past.before(step - 1) or self._past.before(step)
-            if kept is not None and (step < self.step or kept.state.k > self._simulation.k):
-                self._take(kept)
-                self._next(None)
+            if step < self.step or (kept is not None and kept.state.k > self._simulation.k):
+                self._again(step)
             while self.step < step:
                 self._next(self._seen.snapshot)
 
+    def _again(self, step: int) -> None:
+        """Make a step again, from the latest state before it that is kept."""
+        kept = self._past.before(step - 1) or self._past.before(step)
+        if kept is not None:
+            self._take(kept)
+            self._next(None)
+        while self.step < step:
+            self._next(self._seen.snapshot)
+
     def restart(self) -> None:
-        """Begin anew, at step 0. Raises SourceError where the body cannot."""
+        """Begin anew, at step 0; what was is another future. Raises SourceError where the body cannot."""
         with self._whole():
+            before = self._left(-1).bounded()
             self._begin(self._origin, (), {})
+            self.futures = before
 
     def recall(self, steps: int) -> list[Seen]:
         """What was seen of the last steps."""
         with self._whole():
             return recalled(self, steps)
 
+    def _left(self, at: int) -> Futures:
+        """The futures with what came after this step among them, if anything did that can be gone to."""
+        if self._last <= at or not len(self._past):
+            return self.futures
+        return self.futures.leave(at, self._last, self._turned, self._past.after(at), self.history.after(at))
+
+    def switch(self, number: int) -> None:
+        """Go to another future, to the step that is shown, or to its last. Raises SourceError, also where the body
+        cannot do again what it has done."""
+        path, step = self.futures.path(number), self.step
+        if not path:
+            raise SourceError("this future is no longer kept")
+        self._check_going()
+        with self._whole():
+            self._past, self.history = self._past.copy(), self.history.copy()
+            for future in path:
+                self._take_up(future, step)
+
+    def _take_up(self, future: Future, step: int) -> None:
+        """Go on as in a future that branches off from the run as it goes."""
+        at = future.at if future.at >= self._started else -1
+        if at >= 0:
+            self.go(min(self.step, at))
+        others = self._left(at).without(future.number)
+        if at < 0:
+            self._begin(self._origin, (), {})
+        self.futures = others
+        self._past.cut(at)
+        for kept in future.kept:
+            self._past.keep(kept)
+        self.history.go_on(future.history)
+        self._turned, self._last, self._listed = list(future.turned), future.last, ([], ())
+        self._again(max(self.reach.first, min(step, self._last)))
+
     def branch(self) -> None:
-        """Forget what came after the current step."""
+        """Have the run go on differently from here; what came after is another future."""
+        self.futures = self._left(self.step).bounded()
         self._past.cut(self._simulation.k)
         self.history.cut(self.step)
         self._last = self.step

@@ -17,8 +17,9 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.futures import Futures
 from neurovis_spec.live.history import History
-from neurovis_spec.live.turns import Turn
+from neurovis_spec.live.turns import Turn, Turned
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.scene.poses import start_of
@@ -40,9 +41,9 @@ class Reach:
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What kind of source it is. ``takes``: the names of the turns that it accepts, and ``branch`` if it accepts that;
-    ``ends``: there is a last step; ``arrives``: its steps are received from elsewhere, so it is advanced once a frame,
-    not by dt, and waits at the newest."""
+    """What kind of source it is. ``takes``: the names of the turns that it accepts, ``branch`` and ``switch`` if it
+    accepts these; ``ends``: there is a last step; ``arrives``: its steps are received from elsewhere, so it is advanced
+    once a frame, not by dt, and waits at the newest."""
 
     takes: frozenset[str] = frozenset()
     ends: bool = False
@@ -83,15 +84,6 @@ def drawn(skeleton: Skeleton | None, sensor_names: tuple[str, ...], pose: FloatA
 NOTHING = Drawn()
 
 
-@dataclass(frozen=True, slots=True)
-class Turned:
-    """A turn that was taken at ``step``: it has its effect from the next one on. Of several values that were given to
-    one thing at the same step, or in one drag, only the last is kept."""
-
-    step: int
-    turn: Turn
-
-
 class Source(Protocol):
     """What a live view shows. It has a current step as soon as it is made. What raises, a SourceError or anything else,
     leaves it where it stood."""
@@ -100,6 +92,8 @@ class Source(Protocol):
     capabilities: Capabilities
     #: the body, whose pose at a step is in the step's snapshot
     body: Drawn
+    #: what else the run has done behind steps of its past
+    futures: Futures
 
     @property
     def step(self) -> int:
@@ -179,11 +173,15 @@ class Source(Protocol):
         ...
 
     def branch(self) -> None:
-        """Forget what came after the current step, so that the run can go on differently from here."""
+        """Have the run go on differently from here: what came after the current step is another future."""
         ...
 
     def turn(self, turn: Turn) -> None:
-        """Apply a turn; what came after the current step is forgotten. Raises SourceError."""
+        """Apply a turn; what came after the current step is another future. Raises SourceError."""
+        ...
+
+    def switch(self, number: int) -> None:
+        """Go to another future, by its number; the one that is left is another then. Raises SourceError."""
         ...
 
 

@@ -81,6 +81,15 @@ Turn: TypeAlias = Set | Feed | Hold | Release | Lesion | Mend | Learn
 TURNS: Final = frozenset(("set", "feed", "hold", "release", "lesion", "mend", "learn"))
 
 
+@dataclass(frozen=True, slots=True)
+class Turned:
+    """A turn that was taken at ``step``: it has its effect from the next one on. Of several values that were given to
+    one thing at the same step, or in one drag, only the last is kept."""
+
+    step: int
+    turn: Turn
+
+
 def same_value(one: Turn, other: Turn) -> bool:
     """Whether both set the same parameters, feed the same input or clamp the same neurons."""
     match one, other:

@@ -18,9 +18,10 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.clock import FRAMES
+from neurovis_spec.live.futures import Futures
 from neurovis_spec.live.history import Ring
-from neurovis_spec.live.source import NOTHING, Capabilities, Mask, Reach, Seen, SourceError, Turned
-from neurovis_spec.live.turns import Turn, same_value
+from neurovis_spec.live.source import NOTHING, Capabilities, Mask, Reach, Seen, SourceError
+from neurovis_spec.live.turns import Turn, Turned, same_value
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.scene.fading import Fading
@@ -90,7 +91,7 @@ class ReceivedSource:
     def __init__(self, network: Network, room: int = ROOM) -> None:
         self.network, self._room = network, room
         self.capabilities = Capabilities(arrives=True)
-        self.body = NOTHING
+        self.body, self.futures = NOTHING, Futures()
         self._steering: Steering | None = None
         self._turned: tuple[Turned, ...] = ()
         self._changing = network.changing
@@ -307,6 +308,10 @@ class ReceivedSource:
 
     def branch(self) -> None:
         """Raises SourceError: what arrives goes on by itself."""
+        raise SourceError("what arrives goes on by itself")
+
+    def switch(self, number: int) -> None:
+        """Raises SourceError: there is no other future."""
         raise SourceError("what arrives goes on by itself")
 
     def turn(self, turn: Turn) -> None:

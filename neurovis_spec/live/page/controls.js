@@ -51,7 +51,7 @@ export class Controls {
       Home: ['restart', actions.restart],
       e: ['to the next event of the spec', actions.next],
       E: ['to the event before', actions.before],
-      b: ['from here on differently: forget what came after', actions.branch],
+      b: ['from here on differently: what came after becomes another branch', actions.branch],
     };
     followKeys(this.keys);
   }

@@ -135,6 +135,9 @@ const link = new Link({
   traces(traces) {
     strips.take(traces);
   },
+  left(traces) {
+    strips.left = traces;
+  },
   raster(raster) {
     strips.raster(raster);
   },

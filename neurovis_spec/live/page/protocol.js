@@ -36,9 +36,11 @@ import { isStill } from './camera.js';
 /** How the pose of a body is drawn: links are two points and a radius in metres, solids the lowest and the highest corner.
  * @typedef {{points: string[], links: number[][], feet: number[], middle: number,
  *   solids: [number[], number[]][]}} Skeleton */
+/** What else the run has done behind a step: until which step, with what was turned, and what branches off from that.
+ * @typedef {{number: number, at: number, last: number, turned: Turned[], within: Future[]}} Future */
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
  *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
- *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string}} Status */
+ *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[]}} Status */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
  *   | {type: 'body', skeleton: Skeleton | null, start: number[]}
  *   | {type: 'findings', text: string, errors: boolean}
@@ -47,6 +49,7 @@ import { isStill } from './camera.js';
  *   | {type: 'saving', files: string[], diff: string, written: boolean}
  *   | {type: 'refused', reason: string}} Message */
 /** @typedef {{scene: (scene: Scene) => void, frame: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
+ *   left: (traces: Traces) => void,
  *   raster: (raster: Raster) => void,
  *   text: (message: Message) => void, link: (open: boolean) => void}} Listener */
 
@@ -57,6 +60,7 @@ const SCENE = 1,
   TRACE = 3,
   FILE = 4,
   RASTER = 5,
+  LEFT = 6,
   HEAD = 40;
 
 /** Unpack a scene. @param {ArrayBuffer} buffer @returns {Promise<Scene>} */
@@ -255,6 +259,8 @@ export class Link {
       this.listener.file(new TextDecoder().decode(data.slice(4, from)), new Blob([data.slice(from)]));
     } else if (kind === TRACE && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.traces(unpackTraces(data, this.scene));
+    } else if (kind === LEFT && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
+      this.listener.left(unpackTraces(data, this.scene));
     } else if (kind === RASTER && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.raster(unpackRaster(data, this.scene));
     }

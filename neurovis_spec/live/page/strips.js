@@ -27,12 +27,13 @@ const SPIKE = 'spike';
 /** What a strip shows that is the raster of a neuron's group: no name. */
 const RASTER = '*';
 
-/** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is; milliseconds between two traces that are asked for, and until one is asked for again. */
+/** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is, and how pale that of a future that was left; milliseconds between two traces that are asked for, and until one is asked for again. */
 const PINS = 8,
   MARK = 6,
   HIGH = 48,
   SHARE = 0.3,
   PALE = 0.3,
+  FAINT = 0.5,
   WIDE = 4,
   PACE = 40,
   LOST = 2000;
@@ -63,6 +64,8 @@ export class Strips {
     this.when = -LOST;
     /** whether an answer is awaited */
     this.waiting = false;
+    /** how the future went that was left last @type {Traces | null} */
+    this.left = null;
     this.timer = 0;
     this.of(this.held, undefined);
     this.list();
@@ -332,8 +335,10 @@ export class Strips {
     for (const strip of [...this.pinned, this.held]) {
       const trace = traces.ranges.get(strip.key);
       const behind = strip.behind.flatMap((key) => traces.ranges.get(key) ?? []);
-      if (trace) this.paint(strip, trace, traces, behind, traces.ranges.get(this.marks(strip)));
+      const left = this.left?.ranges.get(strip.key);
+      if (trace) this.paint(strip, trace, traces, { behind, left }, traces.ranges.get(this.marks(strip)));
     }
+    this.left = null;
     this.show();
   }
 
@@ -377,9 +382,10 @@ export class Strips {
   }
 
   /** Draw a trace: a line, up and down in each bin where it has several steps; above it marks where it fires, unless the
-   * trace itself shows that; behind it, wide and pale, others. @param {Strip} strip @param {Float32Array} trace
-   * @param {Traces} traces @param {Float32Array[]} behind @param {Float32Array} [spikes] */
-  paint(strip, trace, { first, every }, behind, spikes) {
+   * trace itself shows that; behind it, wide and pale, others, and, pale, how the future went that was left.
+   * @param {Strip} strip @param {Float32Array} trace
+   * @param {Traces} traces @param {{behind: Float32Array[], left: Float32Array | undefined}} others @param {Float32Array} [spikes] */
+  paint(strip, trace, { first, every }, { behind, left }, spikes) {
     strip.seen = [trace, ...behind].map((one) => ({ trace: one, first, every }));
     const { canvas } = strip,
       [context, x] = this.blank(canvas);
@@ -387,7 +393,7 @@ export class Strips {
       style = getComputedStyle(canvas),
       { scrubber } = this;
     let [low, high] = [Infinity, -Infinity];
-    for (const one of [trace, ...behind]) {
+    for (const one of [trace, ...behind, ...(left ? [left] : [])]) {
       for (const value of one) {
         if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
       }
@@ -435,13 +441,19 @@ export class Strips {
       context.lineWidth = WIDE;
       follow(context, other, middle, y);
     }
+    if (left) {
+      context.globalAlpha = FAINT;
+      context.lineWidth = 1.2;
+      follow(context, left, middle, y);
+    }
     context.globalAlpha = 1;
     context.lineWidth = 1.2;
     follow(context, trace, middle, y);
+    const went = left?.some(Number.isFinite) ? ', behind it how it went before' : '';
     canvas.setAttribute(
       'aria-label',
       known
-        ? `${strip.told} from step ${scrubber.low} to ${scrubber.high}: between ${signed(low)} and ${signed(high)}`
+        ? `${strip.told} from step ${scrubber.low} to ${scrubber.high}: between ${signed(low)} and ${signed(high)}${went}`
         : `${strip.told}: nothing is known of these steps`,
     );
   }

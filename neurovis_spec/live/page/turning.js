@@ -8,6 +8,7 @@ import { Feeds } from './feeds.js';
 import { Rules } from './rules.js';
 import { Sliders, withNumber } from './sliders.js';
 
+/** @typedef {import('./protocol.js').Future} Future */
 /** @typedef {import('./protocol.js').Gains} Gains */
 /** @typedef {import('./protocol.js').Status} Status */
 /** @typedef {import('./protocol.js').Declared} Declared */
@@ -54,6 +55,7 @@ export class Turning {
       /** @type {HTMLButtonElement} */ (find('pathways')),
     );
     this.shown = '';
+    this.others = '';
     /** @type {Declared[]} */
     this.declared = [];
     this.ref = '';
@@ -111,7 +113,33 @@ export class Turning {
     this.feeds.show(status.fed);
     this.rules.show(status.learning);
     this.list(status.turned, status.appearance);
+    this.branches(status.futures);
     /** @type {HTMLTextAreaElement} */ (this.find('events')).value = eventsOf(status.turned);
+  }
+
+  /** List what else the run has done, with what was turned in it; one click goes there. @param {Future[]} futures */
+  branches(futures) {
+    const list = this.find('others'),
+      key = JSON.stringify(futures);
+    this.find('futures').hidden = !futures.length;
+    if (key === this.others) return;
+    this.others = key;
+    const rows = (/** @type {Future[]} */ some) =>
+      [...some].reverse().map(({ number, at, last, turned, within }) => {
+        const one = document.createElement('li'),
+          go = document.createElement('button');
+        const words = turned.map((entry) => `step ${entry.step + 1}: ${told(entry)}`).join('; ') || 'as it went';
+        go.textContent = `from step ${at + 1} to ${last}: ${words}`;
+        go.onclick = () => this.link.ask('switch', { number });
+        one.append(go);
+        if (within.length) {
+          const inner = document.createElement('ul');
+          inner.append(...rows(within));
+          one.append(inner);
+        }
+        return one;
+      });
+    list.replaceChildren(...rows(futures));
   }
 
   /** List what was turned, the latest first, and after that what is drawn otherwise.

@@ -1,0 +1,220 @@
+"""Futures of a live run: what is changed in the past leaves another future, which can be gone to, bit for bit."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.live import futures as kept
+from neurovis_spec.live.futures import Future
+from neurovis_spec.live.history import Bins, Members, Ring
+from neurovis_spec.live.protocol import command_of, status_message
+from neurovis_spec.live.run import Run
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.source import SourceError
+from neurovis_spec.live.turns import Lesion, Set
+from neurovis_spec.live.view import view_of
+
+COMPILED = nv.compile_text(
+    """neurovis: 1
+name: x
+parameters: {pull: {value: 0.1, min: 0, max: 1}}
+neurons:
+  A: {count: 3, activation: tanh, bias: 0.4}
+  B: {activation: tanh, noise: "normal(0, 0.1)"}
+connections:
+  A -> B: {weight: -0.5, plasticity: {hebbian: {rate: 0.05}}}
+  B -> A: pull
+"""
+)
+
+
+def at(step: int) -> SimulatedSource:
+    source = SimulatedSource(COMPILED.simulator())
+    while source.step < step:
+        source.advance()
+    return source
+
+
+def known(source: SimulatedSource, steps: int = 400) -> FloatArray:
+    """All activities that its history knows."""
+    return np.stack([source.history.read(Members("neurons", np.array([i])), Bins(0, 1, steps))[:, 0] for i in range(4)])
+
+
+def everything(source: SimulatedSource) -> list[object]:
+    """What can be seen of a run at each of its steps, and what was turned."""
+    here, found = source.step, list[object]()
+    for step in range(source.reach.first, source.reach.last + 1):
+        source.go(step)
+        seen = source.seen()
+        found.append((seen.snapshot.activity.tolist(), seen.snapshot.weights.tolist(), seen.lesioned_neurons.tolist()))
+    found.append((source.turned, known(source).tolist().__repr__()))
+    source.go(here)
+    return found
+
+
+def test_what_was_is_kept_when_something_is_turned_in_the_past_and_can_be_gone_to() -> None:
+    source = at(200)
+    before = everything(source)
+    source.go(80)
+    source.turn(Lesion("A1"))
+    (left,) = source.futures.all
+    assert (left.number, left.at, left.last) == (0, 80, 200)
+    old = left.history.read(Members("neurons", np.array([3])), Bins(0, 1, 201))[:, 0]
+    assert np.isnan(old[:81]).all()
+    assert np.array_equal(old[81:], known(at(200), 201)[3, 81:])
+    while source.step < 150:
+        source.advance()
+    other = everything(source)
+    assert other[:80] == before[:80]
+    assert other[100] != before[100]
+    source.switch(0)
+    assert source.step == 150
+    assert everything(source) == before
+    (left,) = source.futures.all
+    assert (left.number, left.at, left.last) == (1, 80, 150)
+    source.switch(1)
+    assert everything(source) == other
+    while source.advance() and source.step < 260:
+        pass
+    assert source.futures.all[0].last == 200
+
+
+def test_branches_of_branches_are_gone_to_through_these() -> None:
+    source = at(120)
+    first = everything(source)
+    source.go(40)
+    source.turn(Set({"pull": 0.9}))
+    while source.step < 110:
+        source.advance()
+    second = everything(source)
+    source.go(90)
+    source.turn(Lesion("A2"))
+    while source.step < 100:
+        source.advance()
+    third = everything(source)
+    assert [(one.number, one.at) for one in source.futures.all] == [(0, 40), (1, 90)]
+    source.switch(0)
+    assert everything(source) == first
+    (outer,) = source.futures.all
+    assert (outer.number, outer.at, [(one.number, one.at) for one in outer.within]) == (2, 40, [(1, 90)])
+    source.switch(1)
+    assert everything(source) == second
+    numbers = {one.at: one.number for one in source.futures.all}
+    assert set(numbers) == {40, 90}
+    source.switch(numbers[90])
+    assert everything(source) == third
+
+
+def test_beginning_anew_keeps_what_was() -> None:
+    source = at(70)
+    source.turn(Lesion("A1"))
+    while source.step < 90:
+        source.advance()
+    before = everything(source)
+    source.restart()
+    assert source.step == 0
+    assert [(one.at, one.last) for one in source.futures.all] == [(-1, 90)]
+    source.advance()
+    source.switch(0)
+    assert source.step == 1
+    assert everything(source) == before
+    assert source.futures.all[0].at == -1
+
+
+def test_nothing_is_kept_where_nothing_came_after_and_none_is_gone_to_that_there_is_not() -> None:
+    source = at(30)
+    source.turn(Lesion("A1"))
+    source.branch()
+    assert source.futures.all == ()
+    with pytest.raises(SourceError, match="no longer kept"):
+        source.switch(0)
+    source.go(10)
+    source.branch()
+    assert [one.at for one in source.futures.all] == [10]
+    with pytest.raises(SourceError, match="no longer kept"):
+        source.switch(7)
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(["go", "turn", "on", "switch", "restart", "branch"]), st.integers(0, 60)), max_size=14
+    )
+)
+@settings(max_examples=40, deadline=None)
+def test_every_future_is_as_it_was_left(acts: list[tuple[str, int]]) -> None:
+    source, left = at(40), dict[int, list[object]]()
+    for act, number in acts:
+        made, now = source.futures.made, None
+        if act in ("turn", "branch", "restart", "switch"):
+            now = everything(source)
+        if act == "go":
+            source.go(min(number, source.reach.last))
+        elif act == "turn":
+            source.turn(Set({"pull": number / 60}))
+        elif act == "on":
+            for _ in range(number // 3):
+                source.advance()
+        elif act == "branch":
+            source.branch()
+        elif act == "restart":
+            source.restart()
+        elif source.futures.all:
+            chosen = source.futures.all[number % len(source.futures.all)].number
+            source.switch(chosen)
+            assert everything(source) == left[chosen]
+        if now is not None and source.futures.made > made:
+            left[made] = now
+    assert {future.number for future in source.futures.all} <= set(left)
+
+
+def test_they_are_bounded_and_the_oldest_go_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept, "MOST", 3)
+    source = at(20)
+    for number in range(5):
+        source.go(10)
+        source.turn(Set({"pull": 0.1 * (number + 1)}))
+        while source.step < 20:
+            source.advance()
+    assert [one.number for one in source.futures.all] == [2, 3, 4]
+    small = source.futures.bounded(source.futures.all[-1].size)
+    assert [one.number for one in small.all] == [4]
+
+
+def test_a_ring_goes_on_with_steps_of_another() -> None:
+    ring, other = Ring(1, 0), Ring(1, 0)
+    for step in range(50):
+        ring.note(step, np.array([1.0]), np.zeros(0))
+        other.note(step, np.array([2.0]), np.zeros(0))
+    ring.go_on(other.after(29))
+    read = ring.read(Members("neurons", np.array([0])), Bins(0, 1, 50))[:, 0].tolist()
+    assert read == [1.0] * 30 + [2.0] * 20
+    assert other.after(29).size < other.size
+    assert other.after(60).steps == (61, 49)
+    ring.go_on(other.after(60))
+    assert ring.steps == (0, 49)
+
+
+def test_a_status_tells_them_and_a_message_goes_there() -> None:
+    source = at(30)
+    source.go(10)
+    source.turn(Lesion("A1"))
+    source.advance()
+    source.go(5)
+    source.turn(Set({"pull": 0.3}))
+    run = Run(source, view_of(COMPILED, COMPILED.gains), lambda shown: None, lambda: False)
+    told = json.loads(status_message(run.shown().status, True))["futures"]
+    assert [(one["number"], one["at"], one["last"], one["turned"]) for one in told] == [
+        (1, 5, 11, [{"step": 10, "type": "lesion", "part": "A1"}])
+    ]
+    assert [(one["number"], one["turned"]) for one in told[0]["within"]] == [(0, [])]
+    left = run.shown().left
+    assert left is source.futures.all[0].history
+    assert repr(command_of('{"type": "switch", "number": 1}')) == "Switch(number=1)"
+    assert isinstance(source.futures.left, Future)
