@@ -132,7 +132,7 @@ def test_nothing_is_kept_where_nothing_came_after_and_none_is_gone_to_that_there
     source = at(30)
     source.turn(Lesion("A1"))
     source.branch()
-    assert source.futures.all == ()
+    assert not len(source.futures.all)
     with pytest.raises(SourceError, match="no longer kept"):
         source.switch(0)
     source.go(10)
