@@ -74,6 +74,12 @@ _CHANGES: Mapping[Method, str] = {
     "exponential": "(h*exprel(h*min(j, 0)))*f",
     "semi_implicit": "(h*f)/(1 - h*min(j, 0))",
 }
+#: The same state by state, in loops one behind the other, with what each of these leaves, and then the change: of a
+#: loop that calls a function compilers make no vectors.
+_BY_LOOPS: Mapping[Method, tuple[tuple[tuple[str, str], ...], str]] = {
+    "exponential": ((("fj", "h*min(j, 0)"), ("fx", "expm1(j)")), "(h*(1 if j == 0 else e/j))*f"),
+    "semi_implicit": ((), _CHANGES["semi_implicit"]),
+}
 #: Functions of two arguments.
 _OF_TWO = ("atan2", "pow")
 
@@ -95,6 +101,10 @@ class _Integration:
         self.method, self.substeps = self.plan.operation.method, self.plan.operation.substeps
         #: the flow states of a stage
         self.now = "fy" if "fy" in self.plan.parts else "fx"
+        #: whether nobody else reads a state at a stage, so that it changes where it is kept
+        self.in_place = (
+            step.form.follows and not step.form.written_out and len(STAGES[self.method]) == 1 and not self.plan.contacts
+        )
         #: those that are 0 where members rest, and of which else a number says it
         self.resting = {one.key: found for one in self.plan.states if (found := self.rest(one)) is not None}
         self.varying = {one.key: one.varies and one.key not in self.resting for one in self.plan.states}
@@ -129,8 +139,9 @@ class _Integration:
     def write(self) -> None:
         """All of it."""
         code, network, plan = self.code, self.network, self.plan
-        with code.block("if (!follows)") if self.step.form.follows and plan.stays else nullcontext():
-            self.copy("fx[{at}] = {now};")
+        if not self.in_place:
+            with code.block("if (!follows)") if self.step.form.follows and plan.stays else nullcontext():
+                self.copy("fx[{at}] = {now};")
         if network.held_inputs:
             code.line(f"memcpy(fv, s, {network.vector_size}*sizeof(fv[0]));")
         for part in plan.of_stage:
@@ -143,7 +154,8 @@ class _Integration:
             begin = f"(kd - {code.text(1.0)})*{code.text(network.dt)} + ({code.real})sub*{code.text(h)}"
             with self.where_read("since", begin):
                 self.substep(h)
-        self.copy("{cell} = fx[{at}];", back=True)
+        if not self.in_place:
+            self.copy("{cell} = fx[{at}];", back=True)
 
     @contextmanager
     def where_read(self, name: str, value: str) -> Iterator[None]:
@@ -217,7 +229,9 @@ class _Integration:
         if len(stages) == 1:
             with code.block(""):
                 self.stage(times[0], shares[0], "sub == 0")
-                if self.method in _CHANGES:
+                if self.in_place:
+                    self.change_in_place()
+                elif self.method in _CHANGES:
                     self.changes(_CHANGES[self.method])
                 else:
                     self.states(lambda own: [f"fx[i] = fx[i] + {own}*fk[i];"])
@@ -253,6 +267,20 @@ class _Integration:
                     h = self.length(one.use.definition.per_second)
                     change = self.code.value(formula(formula_), {"h": h, "f": "fk[i]", "j": "fj[i]"})
                 self.code.line(f"fx[i] = fx[i] + {self.code.text(change)};")
+
+    def change_in_place(self) -> None:
+        """The same of states whose derivatives and slopes are there; the others have changed with these."""
+        for one in self.plan.states:
+            if self.varying[one.key]:
+                before, change = _BY_LOOPS[self.method]
+                at, h = plus(one.start, "p"), self.length(one.use.definition.per_second)
+                seen: dict[str, Value] = {"h": h, "f": f"fk[{at}]", "j": f"fj[{at}]", "e": f"fx[{at}]"}
+                cell = self.step.states(one.use, "p")[one.name]
+                made = [*((f"{array}[{at}]", "{}", text) for array, text in before), (cell, f"{cell} + {{}}", change)]
+                for there, sum_, text in made:
+                    with self.code.block(self.code.loop("p", one.size)):
+                        value = self.code.text(self.code.value(formula(text), seen))
+                        self.code.line(f"{there} = {sum_.format(value)};")
 
     def heun(self) -> None:
         """x + h/2·(f₁ + f₂)."""
@@ -310,6 +338,11 @@ class _Integration:
                 continue
             with self.unless_there(part, one, first):
                 self.neurons(part, one.formulas, partial(self.give, part, one))
+        noisy = [part for part in parts if part.spread.trees]
+        if noisy and self.plan.diffuses:
+            with self.code.block(f"if ({first})"):
+                for part in noisy:
+                    self.neurons(part, part.spread, partial(self.spread, part))
         for part in parts:
             if part.flows:
                 self.neurons(part, part.derivatives, partial(self.slope, part))
@@ -317,11 +350,6 @@ class _Integration:
         for contacts in self.plan.contacts:
             if contacts.flows:
                 self.step.each(len(contacts.projection.members), {}, partial(self.joined, contacts))
-        noisy = [part for part in parts if part.spread.trees]
-        if noisy and self.plan.diffuses:
-            with self.code.block(f"if ({first})"):
-                for part in noisy:
-                    self.neurons(part, part.spread, partial(self.spread, part))
 
     @contextmanager
     def unless_there(self, part: Part, one: Taken, first: str) -> Iterator[None]:
@@ -381,7 +409,7 @@ class _Integration:
         use = part.population.model if isinstance(part, Part) else part.projection.use
         per_second = use.definition.per_second
         known: dict[str, Value] = {**self.code.parameters(use, place), **self.step.states(use, place)}
-        for name in part.flows:
+        for name in () if self.in_place else part.flows:
             known[name] = f"{self.now}[{plus(self.plan.starts[Key(use.owner, name)], place)}]"
         known["t"] = _clock(per_second)
         known["dt"] = self.network.dt * per_second
@@ -458,6 +486,7 @@ class _Integration:
         more = tuple((name, tree) for name, tree in part.slopes.let if name not in known)
         known = self.step.let(more, known, [*diagonal.values()], functions)
         through = self.through(part, place, known, functions) if isinstance(part, Part) else {}
+        made = list[tuple[str, Value]]()
         for name, tree in part.derivatives.trees:
             key = Key(use.owner, name)
             tree = pausing[name][0].otherwise if name in pausing else tree
@@ -471,6 +500,11 @@ class _Integration:
                 if self.varying[key]:
                     if idle:  # 0, so that the change is 0 even where this is NaN
                         own_slope = f"{idle} ? {code.text(0.0)} : {code.text(own_slope)}"
+                    if self.in_place and name in pausing:
+                        own_slope, slope = (
+                            self.unless_at_rest(pausing[name][0], code.let("n", moved), known, functions)
+                            for moved in (own_slope, slope)
+                        )
                     code.line(f"fj[{at}] = {code.text(own_slope)};")
                 else:
                     h = self.length(use.definition.per_second)
@@ -478,7 +512,17 @@ class _Integration:
                     slope = code.value(formula(changes), parts)
             if idle:
                 slope = f"{idle} ? {code.text(0.0)} : {code.text(slope)}"
-            code.line(f"fk[{at}] = {code.text(slope)};")
+            is_whole = self.in_place and not self.varying[key]
+            made.append(self.changed(use, name, place, slope) if is_whole else (f"fk[{at}]", slope))
+        self.step.store(made)
+
+    def changed(self, use: Use, name: str, place: Place, change: Value) -> tuple[str, Value]:
+        """Where a state of a member is kept, and what becomes of it, by what it changes by, or by its derivative."""
+        code, cell = self.code, self.step.states(use, place)[name]
+        added = code.text(code.let("n", change))
+        if self.method not in _CHANGES:
+            added = f"{code.text(self.length(use.definition.per_second))}*{added}"
+        return cell, f"{cell} + {added}"
 
     def change_or_rest(
         self, key: Key, use: Use, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]
@@ -492,26 +536,34 @@ class _Integration:
         parts["j"] = code.value(slope.otherwise, known, functions)
         parts["f"] = code.let("n", code.value(derivative.otherwise, known, functions))
         moved = code.value(formula(_CHANGES[self.method]), parts)
-        if not self.step.form.written_out:
+        if self.in_place:
+            moved = code.let("n", moved)
+        elif not self.step.form.written_out:
             return moved
+        return self.unless_at_rest(derivative, moved, known, functions)
+
+    def unless_at_rest(
+        self, derivative: Conditional, moved: Value, known: Mapping[str, Value], functions: Mapping[str, Made]
+    ) -> Value:
+        """What is said of a state that moves; 0 where it is at rest."""
         chosen = Conditional(derivative.condition, Number(0.0), Name("it moves"))
-        return code.value(chosen, {**known, "it moves": code.text(moved)}, functions)
+        return self.code.value(chosen, {**known, "it moves": self.code.text(moved)}, functions)
 
     def let_rest(self, part: Part) -> None:
         """What members that rest change by is 0: in a loop of its own, for compilers make vectors of a choice between
         numbers that are there, and not of one with a division in it."""
         owner = part.population.model.owner
         keys = [key for name in part.flows if (key := Key(owner, name)) in self.resting or key in self.pausing]
-        if not keys or self.step.form.written_out:
+        if not keys or self.step.form.written_out or self.in_place:
             return
 
         def rest(place: Place, totals: Mapping[int, str]) -> None:
+            functions = self.step.activation(part.population, place)
             for key in keys:
                 (derivative, _), at = self.resting.get(key) or self.pausing[key], plus(self.plan.starts[key], place)
-                chosen = Conditional(derivative.condition, Number(0.0), Name("it moves"))
                 for array in ("fj", "fk") if key in self.pausing else ("fk",):
-                    known = {**self.known(part, place), "it moves": f"{array}[{at}]"}
-                    self.code.line(f"{array}[{at}] = {self.code.text(self.code.value(chosen, known))};")
+                    value = self.unless_at_rest(derivative, f"{array}[{at}]", self.known(part, place), functions)
+                    self.code.line(f"{array}[{at}] = {self.code.text(value)};")
 
         self.step.each(len(part.population.members), {}, rest)
 
