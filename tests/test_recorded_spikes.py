@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
+from neurovis_spec.runtime import c_backend
 from neurovis_spec.runtime.columns import spiking_of
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import fitted
@@ -228,3 +229,19 @@ def test_neurons_that_all_show_something_else_have_their_spikes(backend: str) ->
     seen = np.argwhere(network.run(backend="reference", states=["H.spike"])["H.spike"] != 0)
     for every in (1, 50):
         assert spikes_of(network.run(backend=backend, every=every)) == [tuple(one) for one in seen.tolist()]
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("every", [1, 7])
+def test_c_notes_all_spikes_however_little_room_there_is(every: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It ends where its room does, and goes on from there; the neurons that spike are not the first."""
+    monkeypatch.setattr(c_backend, "_MOST_NOTED", 1)
+    text = SPEC.replace("  H: {count: 2, model: shown, bias: [1.2, 2]}\n  C: {count: 1, model: counter}\n", "")
+    text = text.replace("outputs: {both: K + H}\n", "").replace("  O: {count: 1}\n", "")
+    network = nv.compile_text(text.replace("neurons:\n", "neurons:\n  O: {count: 1, bias: 0.5}\n"))
+    assert spiking_of(network.network).together == range(1, 4)
+    expected = network.run(backend="reference", every=every)
+    run = network.run(backend="c", every=every)
+    assert len(spikes_of(run)) > 10
+    assert spikes_of(run) == spikes_of(expected)
+    np.testing.assert_array_equal(run["K"], expected["K"])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, Literal, Protocol, runtime_checkable
 
 from neurovis_spec import plugins
 from neurovis_spec.arguments import callers_level
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import RULE, SYNAPSE
@@ -117,6 +117,21 @@ class Probing(Protocol):
     def probe(self, probe: Probe, states: FloatArray) -> None:
         """In the next run put what a probe reads behind each step that is kept into the first rows of ``states``
         (rows, columns)."""
+        ...
+
+
+@runtime_checkable
+class Noting(Protocol):
+    """A Runner that can note spikes, so that nobody has to look for them in rows of all neurons."""
+
+    def note(self, neurons: range) -> None:
+        """In the next run note which of these neurons have an activity other than 0 behind each step; it may end before
+        its last step."""
+        ...
+
+    def fired(self, made: int) -> tuple[IntArray, IntArray]:
+        """What the last run has noted, which has ``made`` so many steps: in which of these (spikes,), and of which
+        neuron that was asked for (spikes,), both from 0 on and in this order."""
         ...
 
 

@@ -22,7 +22,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Definition, Key
 from neurovis_spec.compiler.values.spikes import always_finite
@@ -49,6 +49,8 @@ LONGEST = 1024
 #: addition neurons that take ``initial``
 _PLAIN, _GENERAL, _FIRST = 0, 1, 2
 _NO_INPUTS: Final[frozenset[str]] = frozenset()
+#: spikes of a run that there is room for: it ends before its last step where there are more
+_MOST_NOTED: Final = 1 << 16
 #: a step behind all others
 _NEVER: Final = 1 << 62
 
@@ -65,6 +67,8 @@ _NEVER: Final = 1 << 62
 #: for them), which lie next to each other if ``beside``; and one of ``states``, with the ``columns`` numbers that
 #: ``probed`` points to, of which signals of synapses stand in ``formed``; where rules change weights that these read,
 #: those of the step are kept in ``weighed``.
+#: Of the ``spiking`` neurons from ``spikes_from`` on, those whose activity behind a step is a number and not 0 stand in
+#: ``fired`` then, and in ``noted`` how many do; it ends behind the step after which there may be more than ``most``.
 #: With ``look`` it ends behind the first step after which something is not finite; ``fused``: whether steps may be made
 #: in the fused form, as where nothing reads states that are kept once in it.
 _HEAD: Final = """#include <math.h>
@@ -90,7 +94,9 @@ typedef struct {
 } nv_state;
 
 typedef struct {
-    int64_t k, steps, every, form, then, look, fused, beside, changes, columns;
+    int64_t k, steps, every, form, then, look, fused, beside, changes, columns, spikes_from, spiking, most;
+    int32_t *fired;
+    int64_t *noted;
     double *rows, *activity, *weights, *states, *formed, *weighed;
     const int64_t *changing;
     const double *const *probed;
@@ -111,6 +117,18 @@ static uint64_t nv_odd(const double *values, int64_t count)
         found |= (bits & UINT64_C(0x7ff0000000000000)) + UINT64_C(0x0010000000000000);
     }
     return found >> 63;
+}
+
+static int64_t nv_note(const double *values, int64_t count, int32_t *fired)
+{
+    int64_t found = 0;
+    for (int64_t q = 0; q < count; q++) {
+        if (q + 16 <= count && nv_quiet(values + q))
+            q += 15;
+        else if (values[q] != 0.0 && values[q] == values[q])
+            fired[found++] = (int32_t)q;
+    }
+    return found;
 }
 
 NV_PUBLIC int64_t nv_once(nv_state *p)
@@ -135,7 +153,7 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
     // over and back takes less than a step does without
     int fused = FUSED && c->fused && c->then == 0 && (c->steps > 3 || !PACKED), once = 0, follows = 0;
     const int64_t begin = PACKED || c->form;
-    int64_t made = 0;
+    int64_t made = 0, noted = 0;
     if (fused)
         nv_pack(p);
     int64_t wait = (c->every - c->k % c->every) % c->every;
@@ -180,9 +198,15 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
                 *states++ = *c->probed[j];
         }
         made = i + 1;
+        if (c->spiking) {
+            noted += nv_note(p->activity + c->spikes_from, c->spiking, c->fired + noted);
+            c->noted[i] = noted;
+        }
         // what no step looked at is checked here; what no step changes, once
         if (c->look && (odd != 0.0 || LOOK_NEURONS(form) || ((form || !i) && LOOK_CONNECTIONS)
                         || (!form && (once ? LOOK_ONCE : LOOK_UNWATCHED))))
+            break;
+        if (c->spiking && noted + c->spiking > c->most)
             break;
     }
     if (fused)
@@ -280,7 +304,7 @@ def _write(network: Network, layout: SignalLayout) -> Written:
         _HEAD,
         c_flows.declarations(built.plan),
         _defined(built, flags, _look(built, watched, once)),
-        emitter.helpers(used),
+        emitter.helpers(used | {"nv_quiet"}),
         tables.text(used),
         "\n".join(bodies),
     ]
@@ -428,10 +452,9 @@ class _Course(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look")),
         *((name, ctypes.c_int64) for name in ("fused", "beside", "changes", "columns")),
-        *(
-            (name, ctypes.c_void_p)
-            for name in ("rows", "activity", "weights", "states", "formed", "weighed", "changing", "probed")
-        ),
+        *((name, ctypes.c_int64) for name in ("spikes_from", "spiking", "most")),
+        *((name, ctypes.c_void_p) for name in ("fired", "noted", "rows", "activity", "weights")),
+        *((name, ctypes.c_void_p) for name in ("states", "formed", "weighed", "changing", "probed")),
     ]
 
 
@@ -479,6 +502,9 @@ class CStepper:
         self._weighed = np.zeros(len(network.connections) if learning.any() else 0)
         #: what the next run reads of states, and where it puts that
         self._probed: tuple[Probe, FloatArray] | None = None
+        #: of which neurons the next run notes spikes; those that the last one has noted, and how many were by each step
+        self._spiking = range(0)
+        self._fired, self._noted = np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int64)
         #: the first step at which nothing is held, left out, still or lost
         self._plain_from = 0
 
@@ -505,6 +531,18 @@ class CStepper:
     def probe(self, probe: Probe, states: FloatArray) -> None:
         """In the next run put what a probe reads behind each step that is kept into the first rows of ``states``."""
         self._probed = probe, states
+
+    def note(self, neurons: range) -> None:
+        """In the next run note which of these neurons fire."""
+        self._spiking = neurons
+        room = max(_MOST_NOTED, 2 * len(neurons))
+        if len(self._fired) < room:
+            self._fired = np.zeros(room, dtype=np.int32)
+
+    def fired(self, made: int) -> tuple[IntArray, IntArray]:
+        """Who has fired in the steps of the last run, of which so many were made."""
+        noted = self._noted[:made]
+        return np.repeat(np.arange(made), np.diff(noted, prepend=0)), self._fired[: noted[-1]].astype(np.int64)
 
     def step(self, state: State, inputs: FloatArray, /) -> None:
         """Advance the state by a step."""
@@ -573,6 +611,11 @@ class CStepper:
                 course.formed = self._formed.ctypes.data
                 course.weighed = self._weighed.ctypes.data if len(self._weighed) else None
             course.columns, course.states, course.probed = len(numbers), states.ctypes.data, numbers.ctypes.data
+        if self._spiking:
+            self._noted = np.zeros(len(rows), dtype=np.int64)
+            course.spikes_from, course.spiking, course.most = self._spiking[0], len(self._spiking), len(self._fired)
+            course.fired, course.noted = self._fired.ctypes.data, self._noted.ctypes.data
+            self._spiking = range(0)
         made: int = self._run(self._address, ctypes.addressof(course))
         state.k += made
         return made

@@ -147,6 +147,12 @@ class Spiking:
         found = subscript(self.by_activity)
         return slice(0) if found is None else found
 
+    @property
+    def together(self) -> range | None:
+        """All that do, where they lie side by side and their activities say it; else None."""
+        found = self.activities
+        return range(found.start, found.stop) if isinstance(found, slice) and not len(self.by_state) else None
+
     def now(self, state: State) -> IntArray:
         """Those that have fired in the last step, ascending."""
         fired = self.by_activity[_fire(state.activity[self.activities])]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from time import monotonic
 from typing import Final, NamedTuple, Protocol
@@ -22,7 +23,7 @@ from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, deferred
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.backend import Probing, Runner, Stepper, ready
+from neurovis_spec.runtime.backend import Noting, Probing, Runner, Stepper, ready
 from neurovis_spec.runtime.checkpoint import load_state, save_state
 from neurovis_spec.runtime.columns import Columns, Numbers, Spiking, columns_of, recording_of
 from neurovis_spec.runtime.controls import Controls
@@ -35,7 +36,7 @@ from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.resume import learned_state, resumed_state
 from neurovis_spec.runtime.rows import STRETCH, After, Rows, RowSink, Steps, Widths
-from neurovis_spec.runtime.spikes import SpikeLog
+from neurovis_spec.runtime.spikes import Fired, SpikeLog
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.until import Watched
 from neurovis_spec.runtime.watch import Watch
@@ -416,8 +417,8 @@ class _Together:
 
     def _run(self, state: State, vectors: FloatArray, room: Rows, every: int, look: bool) -> int:
         """Steps, as the runner makes them, or fewer where the run is to end before."""
-        if self.watched is None and self.spiking is None:
-            return self._made(state, vectors, room, every, look)
+        if self._by_runner is not None or (self.watched is None and self.spiking is None):
+            return self._noted(state, vectors, room, every, look)
         first, before = state.k, None if self.watched is None else state.copy()
         # the measure and spikes are of every step, the recording of one in ``every``
         seen = room if self._kept(every) else self._room_for(len(vectors), room)
@@ -439,6 +440,24 @@ class _Together:
             self._made(state, vectors[:count], seen, 1, False)
         return count
 
+    @cached_property
+    def _by_runner(self) -> range | None:
+        """The neurons whose spikes the runner notes, where it can, and nothing else looks at each step; else None."""
+        if self.spiking is None or self.watched is not None or not isinstance(self.runner, Noting):
+            return None
+        return self.spiking.together
+
+    def _noted(self, state: State, vectors: FloatArray, room: Rows, every: int, look: bool) -> int:
+        """Steps, and the spikes that the runner has noted."""
+        first, fired, neurons = state.k, self.hands.rows.fired, self._by_runner
+        if neurons is None or fired is None or not isinstance(self.runner, Noting):
+            return self._made(state, vectors, room, every, look)
+        self.runner.note(neurons)
+        made = self._made(state, vectors, room, every, look)
+        steps, which = self.runner.fired(made)
+        fired.extend(Fired(steps + first, which + neurons.start, first, first + made))
+        return made
+
     def _kept(self, every: int) -> bool:
         """Whether the rows that are kept are all that has to be seen."""
         return every == 1 and (self.spiking is None or not len(self.spiking.by_state))
@@ -454,7 +473,7 @@ class _Together:
     def _most(self, every: int, room: Rows) -> int:
         """The most steps to be seen at once: where spikes are looked for in rows that are not kept, as many as there
         is always room for."""
-        if self.spiking is None or self._kept(every):
+        if self.spiking is None or self._kept(every) or self._by_runner is not None:
             return sys.maxsize
         width: int = sum(array.shape[1] for array in room) + len(self.spiking.by_state)
         return max(STRETCH, _MOST_SEEN // max(1, width))
