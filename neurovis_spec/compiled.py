@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Literal, Unpack
 
 import numpy.typing as npt
 
@@ -41,6 +41,7 @@ from neurovis_spec.keywords import (
     keywords,
     panels_of,
     still_of,
+    weights_alone,
 )
 from neurovis_spec.progress import Progress
 
@@ -88,11 +89,13 @@ class CompiledNetwork(Compilation):
         backend: str | None = None,
         *,
         start: Recording | None = None,
+        only: Literal["weights"] | None = None,
         record: str | Path | bool = False,
         body: str | Path | bool = True,
         **kept: Unpack[KeepKeywords],
     ) -> Simulation:
-        """Step by step, for a control loop; ``start`` is a recording to go on from, ``body`` as in ``run``.
+        """Step by step, for a control loop; ``start`` is a recording to go on from, ``only`` and ``body`` as in
+        ``run``.
 
         With ``record`` it leaves a recording (``sim.recording``), in memory or in a file that is there when the
         simulation is closed (``with network.simulator(record="walk.npz") as sim:``); what of it is recorded is chosen
@@ -101,7 +104,7 @@ class CompiledNetwork(Compilation):
 
         given = completed("simulator", kept, KEEP)
         check(backend=backend, start=start)
-        made = Simulation(self.with_body(body).network, backend, start)
+        made = Simulation(self.with_body(body).network, backend, start, weights_alone=weights_alone(only))
         if record is not False:
             target = None if record is True else arguments.path("record", record)
             made.record(target, given["every"], self._kept_in(target, keep_of(given)))
@@ -158,6 +161,7 @@ class CompiledNetwork(Compilation):
         recording: Recording | None = None,
         *,
         start: Recording | None = None,
+        only: Literal["weights"] | None = None,
         theme: str | None = None,
         engine: str | None = None,
         backend: str | None = None,
@@ -165,15 +169,16 @@ class CompiledNetwork(Compilation):
     ) -> LiveWidget:
         """A widget for a notebook: the network while it runs, in real time, or a ``recording`` of it that plays. Its
         parameters are traits: ``widget.mix = 0.4`` turns one, and one that is turned in the picture changes. ``start``
-        is a recording to go on from; with ``play`` it plays as soon as it is shown. Raises ImportError without the
-        extra ``jupyter``, and what ``layout``, ``run`` and ``simulator`` raise."""
-        from neurovis_spec.live.show import Show
+        is a recording to go on from, ``only`` as in ``run``; with ``play`` it plays as soon as it is shown. Raises
+        ImportError without the extra ``jupyter``, and what ``layout``, ``run`` and ``simulator`` raise."""
+        from neurovis_spec.live.show import Beginning, Show
         from neurovis_spec.notebook.widget import LiveWidget
 
         check(recording=recording, start=start, theme=theme, engine=engine, backend=backend)
         if recording is not None and (start is not None or backend is not None):
             raise ValueError("'start' and 'backend' are for a run, and a 'recording' is played: give one of the two")
-        return LiveWidget(self, Show(recording, start, theme, engine, backend), arguments.truth("play", play))
+        begin = Beginning(start, weights_alone(only))
+        return LiveWidget(self, Show(recording, begin, theme, engine, backend), arguments.truth("play", play))
 
     def until(self, text: str) -> Until:
         """A measure that ends runs, ``rms(O - T, last=129) < 0.01``: its ``ending`` says how the last one ended. Raises

@@ -189,6 +189,13 @@ def keep_of(given: KeepKeywords, last: bool = False) -> Keep:
     return Keep(neurons, weights, some, states, last=arguments.truth("last", last), sent=sent)
 
 
+def weights_alone(only: object) -> bool:
+    """Whether nothing but weights is taken of a recording. Raises ValueError for what is no word for that."""
+    if only not in (None, "weights"):
+        raise ValueError(f"only is 'weights' or None, not {only!r}")
+    return only is not None
+
+
 def course_of(
     network: Network, steps: int | None, inputs: Mapping[str, npt.ArrayLike] | None, given: MemoryKeywords
 ) -> Course:
@@ -198,8 +205,6 @@ def course_of(
 
     check(backend=given["backend"], start=given["start"], progress=given["progress"], inputs=inputs)
     until, checkpoint = given["until"], given["checkpoint"]
-    if given["only"] not in (None, "weights"):
-        raise ValueError(f"only is 'weights' or None, not {given['only']!r}")
     if isinstance(until, str):
         until = Until(until, network)
     elif until is not None:
@@ -210,7 +215,7 @@ def course_of(
         inputs=inputs,
         backend=given["backend"],
         start=given["start"],
-        weights_alone=given["only"] is not None,
+        weights_alone=weights_alone(given["only"]),
         until=until,
         keep=keep_of(given, given["last"]),
         checkpoint=None if checkpoint is None else arguments.path("checkpoint", checkpoint),

@@ -23,6 +23,7 @@ import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.live.carry import carried
+from neurovis_spec.live.show import Beginning
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.runtime import c_backend, c_export
 from neurovis_spec.runtime.recording import Recording
@@ -256,6 +257,15 @@ def test_a_trial_that_keeps_what_was_learned_alone(tmp_path: Path) -> None:
     for k in range(5):
         again.step()
         np.testing.assert_array_equal(again.activity, second.activity[k])
+    for begun in (
+        network.simulator("numpy", start=first, only="weights"),
+        Beginning(first, weights_alone=True).simulation(network.network, "numpy"),
+    ):
+        for k in range(5):
+            begun.step()
+            np.testing.assert_array_equal(begun.activity, second.activity[k])
+    with pytest.raises(ValueError, match="only is 'weights' or None, not 'all'"):
+        network.simulator(start=first, only="all")  # type: ignore[arg-type]
     assert second.activity[0, -1] == 0.2  # the initial activity is taken
     assert not np.array_equal(second.activity, first.activity)
     with pytest.raises(ValueError, match="a reset keeps 'weights' or None, not 'all'"):

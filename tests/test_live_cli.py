@@ -127,6 +127,7 @@ def test_what_cannot_be_shown_is_answered_clearly(spec: Path) -> None:
         ((spec, spec), 2, "live shows one network, and 2 specs are given"),
         (("-", "--watch"), 2, "standard input cannot be watched"),
         ((spec, "--recording", recording, "--from", recording), 2, "give one of them"),
+        ((spec, "--only", "weights"), 2, "give one with --from"),
         ((recording, "--watch"), 2, "is a recording: SPEC is the spec that it was made of"),
         ((recording, "--recording", recording), 2, "is a recording: SPEC is the spec that it was made of"),
         ((recording,), 1, f"help: name it: neurovis live SPEC --recording {recording}"),

@@ -334,9 +334,7 @@ def test_title_true_false_or_a_text() -> None:
 
 @pytest.mark.parametrize("size", [None, (420, 600), (900, 300)])
 def test_a_long_title_is_in_lines_and_all_else_below_them(size: tuple[int, int] | None) -> None:
-    title = (
-        "A title of many words that says at length what this network is about, who made it, when, " * 2 + "x" * 90
-    )
+    title = "A title of many words that says at length what this network is about, who made it, when, " * 2 + "x" * 90
     scene = picture(settings=RenderSettings(title=title, size=size))
     lines = [s for g in scene.groups if g.id == "title" for s in g.shapes if isinstance(s, Text)]
     assert "".join(line.text for line in lines).replace(" ", "") == title.replace(" ", "")

@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 import click
 
@@ -17,9 +17,11 @@ from neurovis_spec.cli.options import (
     as_one,
     backend_option,
     body_options,
+    check_only,
     compile_options,
     engine_option,
     examples,
+    only_option,
     run_option,
     set_option,
     start_option,
@@ -49,6 +51,7 @@ class Played:
     recording: str | None
     run: int | None
     start: str | None
+    only: Literal["weights"] | None
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,7 @@ played_options: Final = as_one(
     ),
     run_option,
     start_option,
+    only_option,
 )
 door_options: Final = as_one(
     "door",
@@ -97,6 +101,7 @@ door_options: Final = as_one(
         "neurovis live first.yaml --watch --open",
         "neurovis live first.yaml --recording first.npz",
         "neurovis live first.yaml --from first.npz --viewers",
+        "neurovis live first.yaml --from first.npz --only weights",
     )
 )
 @click.argument("specs", metavar="SPEC", nargs=-1, required=True, shell_complete=paths)
@@ -119,6 +124,7 @@ def command(
         raise click.UsageError(f"live shows one network, and {len(specs)} specs are given: start it once for each")
     if played.recording is not None and played.start is not None:
         raise click.UsageError("--from begins a run, and --recording plays one that was made: give one of them")
+    check_only(played.only, played.start)
     (spec,) = specs
     if watch and spec == "-":
         raise click.UsageError("standard input cannot be watched: give the path of a spec")
@@ -128,11 +134,12 @@ def command(
         )
     from neurovis_spec.live.desk import Written
     from neurovis_spec.live.live import Edited
-    from neurovis_spec.live.show import Show
+    from neurovis_spec.live.show import Beginning, Show
 
     network, recording = _network(spec, played, settings, watch or played.start is not None)
     in_place = None if spec == "-" or _is_recording(spec) else Written(Path(spec), compiler_in_place(spec, settings))
-    show = Show(recording, recording_of(played.start), drawn.theme, drawn.engine, drawn.backend)
+    begin = Beginning(recording_of(played.start), played.only is not None)
+    show = Show(recording, begin, drawn.theme, drawn.engine, drawn.backend)
     _show(network, show, in_place, Edited(Path(spec), compiler(spec, settings)) if watch else None, door)
 
 

@@ -308,6 +308,17 @@ start_option = click.option(
     help="Begin with the last weights and activities of this recording; states of models begin anew, but in a network "
     "with derivatives, where the recording has them (run --states all).",
 )
+only_option = click.option(
+    "--only",
+    type=click.Choice(["weights"]),
+    help="With --from take nothing but the weights of connections that learn: a new trial.",
+)
+
+
+def check_only(only: str | None, start: str | None) -> None:
+    """Refuse to take some of a recording where none is given. Raises UsageError."""
+    if only is not None and start is None:
+        raise click.UsageError("--only says what is taken of a recording: give one with --from")
 
 
 def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:

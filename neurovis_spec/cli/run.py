@@ -24,8 +24,10 @@ from neurovis_spec.cli.options import (
     Running,
     as_one,
     body_options,
+    check_only,
     compile_options,
     examples,
+    only_option,
     output_option,
     running_options,
     start_option,
@@ -80,11 +82,7 @@ keeping_options: Final = as_one(
         "--every", type=click.IntRange(1, 2**53), default=1, metavar="K", help="Record every K-th step only; default 1."
     ),
     start_option,
-    click.option(
-        "--only",
-        type=click.Choice(["weights"]),
-        help="With --from take nothing but the weights of connections that learn: a new trial.",
-    ),
+    only_option,
     click.option(
         "--states",
         metavar="REF",
@@ -190,8 +188,7 @@ def command(spec: str, running: Running, keeping: Keeping, checking: Checking, o
     between what flows), and what it reaches, has no order.
     """
     checking.check(keeping, output)
-    if keeping.only is not None and keeping.start is None:
-        raise click.UsageError("--only says what is taken of a recording: give one with --from")
+    check_only(keeping.only, keeping.start)
     network = _network(spec, running, keeping, output)
     steps, arrays = running.steps, tables(running.inputs, network.network)
     if checking.step:

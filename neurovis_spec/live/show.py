@@ -1,6 +1,6 @@
 """Show: what a live view shows of a compiled network, and how.
 
-In: a recording or the start of a run, a theme, an engine, a backend. Out: of a compiled network its source and view.
+In: a recording or how a run begins, a theme, an engine, a backend. Out: of a compiled network its source and view.
 """
 
 from __future__ import annotations
@@ -21,15 +21,28 @@ from neurovis_spec.live.view import View, view_of
 from neurovis_spec.runtime.simulation import Simulation
 
 if TYPE_CHECKING:
+    from neurovis_spec.compiler.network import Network
     from neurovis_spec.runtime.recording import Recording
 
 
 @dataclass(frozen=True)
+class Beginning:
+    """How a run begins: anew, or after a recording, of which nothing may be taken but the weights that learn."""
+
+    start: Recording | None = None
+    weights_alone: bool = False
+
+    def simulation(self, network: Network, backend: str | None) -> Simulation:
+        """The run. Raises RecordingError, BackendError."""
+        return Simulation(network, backend, self.start, weights_alone=self.weights_alone)
+
+
+@dataclass(frozen=True)
 class Show:
-    """What is shown, and how: a run, which may go on from ``start``, or a ``recording``."""
+    """What is shown, and how: a run with its ``begin``, or a ``recording``."""
 
     recording: Recording | None = None
-    start: Recording | None = None
+    begin: Beginning = Beginning()
     theme: str | None = None
     engine: str | None = None
     backend: str | None = None
@@ -49,7 +62,7 @@ class Show:
                 return recorded, view
 
             return same_row
-        simulation = Simulation(compiled.network, self.backend, self.start)
+        simulation = self.begin.simulation(compiled.network, self.backend)
 
         def same_step(old: Source) -> Stage:
             assert isinstance(old, SimulatedSource)
@@ -60,7 +73,7 @@ class Show:
     def _source(self, compiled: Compilation) -> Source:
         if self.recording is not None:
             return RecordedSource(compiled.network, self.recording)
-        return SimulatedSource(Simulation(compiled.network, self.backend, self.start))
+        return SimulatedSource(self.begin.simulation(compiled.network, self.backend))
 
     def view(self, compiled: Compilation, appearance: Appearance = AS_IT_IS, layout: Layout | None = None) -> View:
         """How a network is drawn, by default in its own layout. Raises LayoutRefusalError."""

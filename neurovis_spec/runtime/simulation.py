@@ -43,7 +43,7 @@ from neurovis_spec.runtime.quantities import Quantities
 from neurovis_spec.runtime.record import end_values
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_lasting_state, find_neurons, find_parts
-from neurovis_spec.runtime.resume import resumed_state
+from neurovis_spec.runtime.resume import learned_state, resumed_state
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.watch import Checked, Watch
@@ -63,10 +63,11 @@ class ParameterError(ValueError):
 
 
 class Simulation:
-    """A run in the making; ``start`` is a recording to go on from (see ``resume``), ``inputs`` are whole arrays that
-    replace the sources of inputs. Without a ``backend`` it goes on with that of what it goes on from, else with the one
-    that is chosen. Events of the spec apply at their steps; what is done by hand between two steps comes after the
-    events of the step to come. Raises BackendError, RecordingError, ParameterError (see ``step``).
+    """A run in the making; ``start`` is a recording to go on from (see ``resume``), of which ``weights_alone`` takes
+    nothing but weights that learn; ``inputs`` are whole arrays that replace the sources of inputs. Without a
+    ``backend`` it goes on with that of what it goes on from, else with the one that is chosen. Events of the spec apply
+    at their steps; what is done by hand between two steps comes after the events of the step to come. Raises
+    BackendError, RecordingError, ParameterError (see ``step``).
     """
 
     def __init__(
@@ -76,6 +77,8 @@ class Simulation:
         start: Recording | None = None,
         inputs: Mapping[str, npt.ArrayLike] | None = None,
         body: Embodied | None = None,
+        *,
+        weights_alone: bool = False,
     ) -> None:
         self.network = network
         self._asked_backend, self._inputs, self._watch = backend, inputs, Watch(network)
@@ -84,9 +87,8 @@ class Simulation:
         #: the inputs that the caller gives for the whole run; the body does not sense these
         self._given = frozenset(inputs or ())
         self._use_backend("" if start is None else start.backend)
-        self._begin = (
-            initial_state(network) if start is None else resumed_state(network, start, self._backend.functions)
-        )
+        resumed = learned_state if weights_alone else resumed_state
+        self._begin = initial_state(network) if start is None else resumed(network, start, self._backend.functions)
         self._backend.take(self._begin)
         self._apply(self._begin)
         self._recorder: Recorder | None = None
