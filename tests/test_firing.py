@@ -67,6 +67,21 @@ def test_groups_are_means_of_their_neurons() -> None:
     assert analysis.group_firing(RUN, "K1 + H").rows.labels == ("K1", "H")  # not all of K
 
 
+def test_groups_whose_neurons_have_names_are_groups(tmp_path: Path) -> None:
+    text = "neurovis: 1\nname: x\ntime: {dt: 0.01, steps: 60}\n"
+    text += "neurons: {C: {names: [A, B, D], model: integrate_and_fire, bias: [2, 3, 0]}, K: {count: 2}}\n"
+    text += "outputs: {both: A + B}\n"
+    network = nv.compile_text(text)
+    run = network.run(backend="numpy")
+    run.save(tmp_path / "x.npz")
+    for one in (run, nv.load(tmp_path / "x.npz")):
+        made = analysis.group_firing(one)
+        assert made.rows.labels == ("C",)
+        assert made["C", "neurons"] == 3
+        assert made["C", "spikes"] == len(one.spikes("C").times) > 0
+        assert analysis.group_firing(one, "both").rows.labels == ("A", "B")
+
+
 def test_steps_and_neurons_are_chosen() -> None:
     late = analysis.firing(RUN, "K2 + O", 100, 200)
     assert late.rows.labels == ("K2",)

@@ -264,6 +264,8 @@ BAD: Mapping[str, Mapping[str, object]] = {
     "'about' is no mapping": {"about": np.array("[1]")},
     "JSONDecodeError": {"about": np.array("{")},
     "names neurons that are not there": {"about": np.array(json.dumps({"views": {"K": [[7], False]}}))},
+    "names groups that are no views": {"about": np.array(json.dumps({"named": ["C"]}))},
+    "names no groups": {"about": np.array(json.dumps({"named": 1}))},
     "counts no instances": {"about": np.array(json.dumps({"counted": {"left": -1}}))},
     "counts more instances than there is room for": {"about": np.array(json.dumps({"counted": {"left": 1 << 60}}))},
     "'weights_after' has the shape": {"weights_after": np.zeros(2)},

@@ -17,6 +17,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.excerpt import chosen
 from neurovis_spec.runtime.named_array import Axis, NamedArray
+from neurovis_spec.runtime.names import are_numbered
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.spikes import Fired
 
@@ -289,18 +290,12 @@ def _groups(recording: Recording, names: Sequence[str]) -> Mapping[str, IntArray
     group_of, there = dict[str, str](), set(names)
     for name, (members, _) in recording.views.items():
         called = [recording.neurons[member] for member in members]
-        if there.issuperset(called) and _are_numbered(name, called):
+        if there.issuperset(called) and (name in recording.named or are_numbered(name, called)):
             group_of.update(dict.fromkeys(called, name))
     found: dict[str, list[int]] = {}
     for place, name in enumerate(names):
         found.setdefault(group_of.get(name, name), []).append(place)
     return {name: np.array(places, dtype=np.int64) for name, places in found.items()}
-
-
-def _are_numbered(name: str, called: Sequence[str]) -> bool:
-    """Whether neurons are called as those of a group of this name are: ``K3``, ``K4``, …"""
-    first = called[0].removeprefix(name) if called else ""
-    return first.isdecimal() and [*called] == [f"{name}{int(first) + place}" for place in range(len(called))]
 
 
 def _cuts(first: int, stop: int, count: int) -> IntArray:

@@ -369,6 +369,7 @@ def recording_of(
         network=network.name,
         hash=network.hash,
         counted=names.counted,
+        named=names.named,
         states=rows.states,
         state_names=columns.state_names,
         state_views=columns.outputs,

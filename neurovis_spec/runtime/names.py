@@ -9,7 +9,7 @@ left2.K2, ``left.K1..K2`` those and left1.K1, left2.K1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count, takewhile
 from typing import NamedTuple
@@ -41,6 +41,8 @@ class Names:
     states: Mapping[str, int] = field(default_factory=dict)
     #: outputs that name states, and whether a single one is meant
     state_views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
+    #: groups whose neurons have names of their own
+    named: tuple[str, ...] = ()
 
     def find_states(self, reference: str) -> Found | str | None:
         """The columns of the states of a reference; None where it is to no state, a text where that is not there."""
@@ -182,7 +184,15 @@ def names_of(network: Network) -> Names:
     named = {one.path: one.declared for one in numbered if one.path != f"{one.declared}{one.number}"}
     counted = {one.declared: one.number for one in numbered if one.path not in named}
     together = {name: (neurons, False) for name, neurons in _together(network, named).items()} if named else {}
-    return Names(network.neuron_index, outputs | groups | together, counted)
+    neurons = network.neurons.names
+    own = (name for name, (members, _) in groups.items() if not are_numbered(name, [neurons[one] for one in members]))
+    return Names(network.neuron_index, outputs | groups | together, counted, named=tuple(own))
+
+
+def are_numbered(name: str, called: Sequence[str]) -> bool:
+    """Whether neurons are called as those of a counted group of this name are: ``K3``, ``K4``, …"""
+    first = called[0].removeprefix(name) if called else ""
+    return first.isdecimal() and [*called] == [f"{name}{int(first) + place}" for place in range(len(called))]
 
 
 def _together(network: Network, named: Mapping[str, str]) -> dict[str, tuple[int, ...]]:

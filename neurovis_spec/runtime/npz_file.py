@@ -261,6 +261,8 @@ def _fixed_arrays(recording: Recording) -> dict[str, Array]:
     }
     if recording.backend:
         about["backend"] = recording.backend
+    if recording.named:
+        about["named"] = [*recording.named]
     more: dict[str, Array] = {}
     if recording.state_names:
         about["state_views"] = {
@@ -413,6 +415,7 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         network=str(about.get("network", "")),
         hash=str(about.get("hash", "")),
         counted=_counted(about, n),
+        named=_named(about),
         states=arrays["states"].astype(np.float64) if state_names else np.zeros((rows, 0)),
         state_names=state_names,
         state_views=_views(about, "state_views", len(state_names)),
@@ -522,6 +525,16 @@ def _views(about: Mapping[str, object], key: str, n: int) -> dict[str, tuple[tup
             raise RecordingError(f"'about': '{name}' names {_VIEWED[key]} that are not there")
         checked[str(name)] = (tuple(members), bool(single))
     return checked
+
+
+def _named(about: Mapping[str, object]) -> tuple[str, ...]:
+    """The groups whose neurons have names of their own; none in recordings of before."""
+    named, views = about.get("named", []), about.get("views", {})
+    if not isinstance(named, list) or not isinstance(views, dict):
+        raise RecordingError("'about' names no groups")
+    if not all(isinstance(name, str) and name in views for name in named):
+        raise RecordingError("'about' names groups that are no views")
+    return tuple(map(str, named))
 
 
 def _counted(about: Mapping[str, object], n: int) -> dict[str, int]:

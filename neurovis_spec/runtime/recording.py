@@ -118,6 +118,8 @@ class Recording:
     state_names: tuple[str, ...] = ()
     #: outputs that name states: columns of ``states``, and whether a single one is meant
     state_views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
+    #: the groups among ``views`` whose neurons have names of their own
+    named: tuple[str, ...] = ()
     recorded: IntArray | None = None
     recorded_weights: IntArray | None = None
     #: the spec as one text and the namespace of its topics, for formats that hold them
