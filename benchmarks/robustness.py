@@ -93,6 +93,12 @@ def _pair(body: str, sizes: str = "100000") -> str:
     return HEAD + f"neurons: {{A: {{count: {sizes}}}, B: {{count: {sizes}}}}}\nconnections: {{A -> B: {body}}}\n"
 
 
+def _tied(entries: str, sizes: str = "10") -> str:
+    """Two groups, and entries that are tied to each other."""
+    groups = ", ".join(f"{name}: {{count: {sizes}}}" for name in "ABC")
+    return HEAD + f"neurons: {{{groups}}}\nconnections:\n{entries}"
+
+
 def _instances(count: int, neurons: int) -> str:
     module = f"modules: {{leg: {{neurons: {{A: {{count: {neurons}, bias: 1}}}}}}}}\n"
     return HEAD + module + f"instances: {{left: {{module: leg, count: {count}}}}}\n"
@@ -153,6 +159,32 @@ BOMBS: dict[str, Case] = {
     "counts that are set at 12 levels": Case(_levels(12, "floor(min(p, 3)) + 3", "p + i/1000")),
     "an indegree of 1e18": Case(_pair("{pattern: {fixed_indegree: {count: 1000000000000000000}}}", "10")),
     "a band of 1e18": Case(_pair("{pattern: {band: {width: 1000000000000000000}}}", "10")),
+    "an expression for each of 10^10 pairs": Case(_pair("{where: i == j}"), seconds=0.3, mib=80),
+    "a probability for each of 10^10 pairs": Case(
+        _pair("{pattern: {random: {probability: exp(-abs(i - j))}}}"), seconds=0.3, mib=80
+    ),
+    "a where of 4·10^8 pairs that holds of none": Case(_pair("{where: i > 1e9}", "20000"), seconds=6, mib=60),
+    "a where of 4·10^6 pairs that holds of all": Case(_pair("{where: i >= 0}", "2000"), seconds=1, mib=200),
+    "a where of 10^8 pairs, not defined at the last": Case(
+        _pair("{where: (i > 1e9)/(i + j - 19998)}", "10000"), seconds=2, mib=60
+    ),
+    "a probability of 10^8 pairs beyond 1": Case(
+        _pair("{pattern: {random: {probability: i*j}}}", "10000"), seconds=2, mib=60
+    ),
+    "weights of 10^6 pairs beyond all numbers": Case(
+        _pair("{weight: exp(i*j), pattern: all_to_all}", "1000"), seconds=2, mib=200
+    ),
+    "a where 400 deep": Case(_pair('{where: "' + "(" * 400 + "i" + ")" * 400 + '"}', "10")),
+    "a count of 1e18 for each target": Case(_pair("{pattern: {fixed_indegree: {count: (j + 1)*1e18}}}", "10")),
+    "a drawn count of 1e18": Case(_pair("{pattern: {total: {count: poisson(1e18), multapses: true}}}", "10")),
+    "a total of 1e9 with multapses": Case(_pair("{pattern: {total: {count: 1e9, multapses: true}}}", "10")),
+    "ties in a circle": Case(
+        _tied("".join(f"  A -> {a}: {{weight: {{same_as: A -> {b}}}}}\n" for a, b in ("BC", "CA", "AB")))
+    ),
+    "an entry tied to itself": Case(_tied("  A -> B: {weight: {transpose: A -> B}}\n")),
+    "ties to 100,000 to 100,000": Case(
+        _tied("  A -> B: {pattern: all_to_all}\n  B -> C: {weight: {same_as: A -> B}}\n", "100000"), seconds=0.5, mib=80
+    ),
     "the largest delay": Case(_pair("{pattern: one_to_one, delay: 9223372036854775807}", "10")),
     "an input of 1e12": Case(HEAD + "inputs: {s: {size: 1000000000000}}\nneurons: {A: {input: s}}\n"),
     "a picture of 1e9 by 1e9": Case(_group("") + "render: {size: [1000000000, 1000000000]}\n"),
@@ -184,6 +216,19 @@ LARGE: dict[str, Case] = {
     "20,000 unknown names": Case(_unknown("neurons:\n", "  A#_: {bias: alpha#}\n"), seconds=4, mib=150),
     "20,000 unknown ends": Case(
         _unknown("connections:\n", "  B#_ -> A#_: 1\n", "neurons: {A: {}}\n"), seconds=4, mib=150
+    ),
+    "2,000 wheres, none of which is defined": Case(
+        _tied("  - A -> B: {where: 1/(i - j)}\n" * 2000),
+        seconds=2,
+        mib=60,
+    ),
+    "2,000 ties to an entry that is not there": Case(
+        _tied("".join(f"  - A -> B: {{weight: {{same_as: K{k} -> B}}}}\n" for k in range(2000))), seconds=3, mib=60
+    ),
+    "2,000 ties to one entry": Case(
+        _tied("  - A -> B: {pattern: all_to_all}\n" + "  - A -> C: {weight: {same_as: A -> B}}\n" * 2000),
+        seconds=2,
+        mib=60,
     ),
     "8,000 misspelt parameters": Case(_misspelt("parameters", "1", "bias", "gian"), seconds=3, mib=60),
     "2,000 misspelt inputs": Case(_misspelt("inputs", "{}", "input", "gian", 2000), seconds=3, mib=60),

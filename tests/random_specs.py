@@ -1,4 +1,5 @@
-"""Random specs for laws: groups of any make, connections of any shape, delays, rules; always legal, never explosive."""
+"""Random specs for laws: groups of any make, connections of any shape, by expressions and tied ones among them, delays,
+rules; always legal, never explosive."""
 
 from __future__ import annotations
 
@@ -12,7 +13,10 @@ Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | 
 Spec: TypeAlias = dict[str, Plain]
 
 _ACTIVATIONS: list[Plain] = ["tanh", "sigmoid", "sin", {"clip": {"low": -0.8, "high": 0.9}}, {"gaussian": {"sigma": 2}}]
+_ACTIVATIONS += ["softmax", {"softmax": {"gain": 2}}]
 _MODELS: list[Plain] = ["static", {"leaky_integrator": {"leak": 0.3}}]
+#: each holds of the pairs of the first source, at least
+WHERES = ["i == 0 or i >= j", "i < 1 or (i + j) % 2 == 0", "i*j < 3", "abs(i - j) < 2 or i == 0"]
 _RULES: list[Plain] = [None, None, {"oja": {"rate": 0.01}}, {"decay": {"rate": 0.05}}, {"hebbian": {"rate": 0.002}}]
 _RULES += [[{"oja": {"rate": 0.01}}, {"decay": {"rate": 0.05}}], ["decay", {"bcm": {"rate": 0.001}}, {"oja": {}}]]
 
@@ -50,9 +54,29 @@ def specs(draw: st.DrawFn) -> Spec:
         for j, target in enumerate(order):
             if chooser.random() < 0.5:
                 connections[f"{source} -> {target}"] = _body(chooser, sizes, source, target, i < j)
+    connections |= ties(chooser, sizes, connections)
     wave: dict[str, Plain] = {"expression": "0.3*sin(k/3)"}
     spec: Spec = {"neurovis": 1, "name": "random", "seed": chooser.randrange(100), "inputs": {"wave": wave}}
     return {**spec, "neurons": neurons, "connections": connections, "outputs": {"out": order[-1]}}
+
+
+def ties(chooser: random.Random, sizes: dict[str, int], connections: dict[str, Plain]) -> dict[str, Plain]:
+    """Entries that have the weights of others, between groups of these sizes that nothing connects yet."""
+    made: dict[str, Plain] = {}
+    for name in chooser.sample([*connections], min(2, len(connections))):
+        source, _, target = name.partition(" -> ")
+        way = chooser.choice(["same_as", "transpose"])
+        ends = (source, target) if way == "same_as" else (target, source)
+        fitting = [
+            f"{one} -> {other}"
+            for one in sizes
+            for other in sizes
+            if (sizes[one], sizes[other]) == (sizes[ends[0]], sizes[ends[1]])
+            and f"{one} -> {other}" not in {*connections, *made}
+        ]
+        if fitting:
+            made[chooser.choice(fitting)] = {"weight": {way: name}, "delay": chooser.choice([1, 1, 2])}
+    return made
 
 
 def _body(chooser: random.Random, sizes: dict[str, int], source: str, target: str, forward: bool) -> dict[str, Plain]:
@@ -71,6 +95,8 @@ def _body(chooser: random.Random, sizes: dict[str, int], source: str, target: st
             body["self"] = True
         elif source == target and sizes[source] > 1:
             body["self"] = True
+        if chooser.random() < 0.25:
+            body["where"] = chooser.choice(WHERES)
     rule = chooser.choice(_RULES)
     if rule is not None:
         body["plasticity"] = copy.deepcopy(rule)

@@ -1,4 +1,5 @@
-"""Random specs for the seams between features: modules, states, rules, events, draws, noise, episodes, delays at once.
+"""Random specs for the seams between features: modules, states, rules, events, draws, noise, episodes, delays, ties,
+shares of a group, pairs by expressions at once.
 
 In: a number. Out: a spec as a mapping, the same for the same number, that compiles and does not explode.
 """
@@ -7,7 +8,7 @@ from __future__ import annotations
 
 import random
 
-from random_specs import Plain, Spec
+from random_specs import WHERES, Plain, Spec, ties
 
 _MODELS: tuple[Plain, ...] = (
     "static",
@@ -44,6 +45,8 @@ class Author:
 
     def __init__(self, number: int) -> None:
         self.choose = random.Random(number)
+        #: what came later chooses by itself, so that a number has the rest of its spec as before
+        self.later = random.Random(f"later {number}")
         self.groups: dict[str, int] = {}
         self.states: list[str] = []
         self.entries: list[str] = []
@@ -84,6 +87,9 @@ class Author:
         self.spec["connections"] = connections
         if choose.random() < 0.7:
             self.spec["events"] = self._events()
+        if self.later.random() < 0.4:
+            tied = ties(self.later, self.groups, {name: connections[name] for name in self._sure()})
+            connections |= {name: body for name, body in tied.items() if name not in connections}
         outputs: dict[str, Plain] = {"out": order[-1]}
         if self.states and choose.random() < 0.3:
             outputs["inner"] = choose.choice(self.states)
@@ -98,6 +104,8 @@ class Author:
         group["bias"] = choose.choice([0, 0.2, "b", "0.1*a - 0.05"])
         if size > 1:
             group["count"] = size
+        if name_of(model) in ("static", "leaky_integrator") and self.later.random() < 0.1:
+            group["activation"] = "softmax"
         if choose.random() < 0.3:
             group["initial"] = round(choose.uniform(-1, 1), 3)
         if choose.random() < 0.4:
@@ -142,6 +150,8 @@ class Author:
             body["pattern"] = pattern
             if isinstance(pattern, dict):
                 self.drawn.append(name)
+        if self.later.random() < 0.15:
+            body["where"] = self.later.choice(WHERES)
         self.entries.append(name)
         if choose.random() < 0.35:
             rule = choose.choice(_RULES)
@@ -172,6 +182,10 @@ class Author:
                 if choose.random() < 0.6:
                     events.append({"at": at + choose.randrange(1, 6), "mend": [part]})
         return events
+
+    def _sure(self) -> list[str]:
+        """The entries that are sure to make connections."""
+        return [name for name in self.entries if name not in self.drawn]
 
     def _learning(self) -> list[str]:
         """The entries that learn."""

@@ -575,10 +575,19 @@ def without_draws(spec: Spec) -> Spec:
 
 def renamed(connections: dict[str, Plain], path: str) -> list[Plain]:
     """The connections of a module as those of the instance at ``path``, an entry each."""
+
+    def called(key: str) -> str:
+        source, target = key.split(" -> ")
+        return f"{path}{source} -> {path}{target}"
+
     entries: list[Plain] = []
     for key, body in connections.items():
-        source, target = key.split(" -> ")
-        entries.append({f"{path}{source} -> {path}{target}": copy.deepcopy(body)})
+        assert isinstance(body, dict)
+        own = copy.deepcopy(body)
+        if isinstance(own.get("weight"), dict):  # that of another entry
+            ((way, name),) = own["weight"].items()  # type: ignore[union-attr]
+            own["weight"] = {way: called(str(name))}
+        entries.append({called(key): own})
     return entries
 
 
