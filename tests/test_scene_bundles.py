@@ -171,6 +171,19 @@ def test_both_of_a_symmetric_pair_are_counted_and_neither_way_is_missing() -> No
     assert {name: int(one.data["count"]) for name, one in bundles.items()} == {"A -> B": 10, "B -> A": 10}
 
 
+def test_what_neither_excites_nor_inhibits_is_said_in_words() -> None:
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\nneurons: {A: {count: 3, bias: 1}, B: {count: 4}}\nlayout: {engine: grid}\n"
+        "synapses: {gap: {signal: weight*(pre - post), sign: 0}}\n"
+        "connections: {A -> B: {pattern: all_to_all, weight: 1, delay: 1, synapse: gap}}\n"
+    )
+    scene = drawn(network, most=2)
+    (bundle,) = bundles_of(scene).values()
+    assert bundle.title.startswith("A → B · 10\n10 neither excite nor inhibit: Σ w = 10")
+    assert float(bundle.data["neither"]) == 10
+    assert "neither excite nor inhibit" in [shape.text for shape in scene.shapes() if isinstance(shape, Text)]
+
+
 def test_all_kinds_of_files_show_them(layers: CompiledNetwork) -> None:
     recording = layers.run(3)
     scene = drawn(layers)

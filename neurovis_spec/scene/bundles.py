@@ -41,8 +41,10 @@ _BEND, _BESIDE = 0.14, 1.5
 _LOOP, _OPEN = 58.0, 0.55
 #: Discs beside which gaps and heads of lines are as those of bands.
 _USUAL = 20.0
-#: What is said of a strand.
-DOES: Final = {1: "excite", -1: "inhibit", 0: "neither"}
+#: What a strand does, as data.
+_DOES: Final = {1: "excite", -1: "inhibit", 0: "neither"}
+#: The same in words.
+SAID: Final = {1: "excite", -1: "inhibit", 0: "neither excite nor inhibit"}
 #: The name of a hub: its size, and how far from the hub it may stand.
 _NAME, _FAR = 10.5, 60.0
 
@@ -220,7 +222,7 @@ def drawn(network: Network, bundle: Bundle, theme: Theme, step: int) -> Group:
         shapes += [Spline(band.line.points, colour, band.width), ended(band.line.end, band.width, colour, end)]
     name = one.name(network)
     data = {"class": "bundle", "pathway": name, "count": str(one.count), "sum": f"{one.total:.12g}"}
-    data |= {DOES[strand.end]: f"{strand.total:.12g}" for strand in one.strands}
+    data |= {_DOES[strand.end]: f"{strand.total:.12g}" for strand in one.strands}
     data |= {"learns": ", ".join(one.rules)} if one.rules else {}
     return Group(tuple(shapes), f"bundle:{name}", data, _said(name, one, step))
 
@@ -229,7 +231,7 @@ def _said(name: str, one: Pathway, step: int) -> str:
     """What a pointer shows of a bundle."""
     when = f" at step {step:,}" if one.rules else ""
     strands = [
-        f"{strand.count:,} {DOES[strand.end]}: Σ w = {texts.number(strand.total, 4)}{when}" for strand in one.strands
+        f"{strand.count:,} {SAID[strand.end]}: Σ w = {texts.number(strand.total, 4)}{when}" for strand in one.strands
     ]
     low, high = one.delays
     delays = [] if high == low == 1 else [f"delay {low}" if low == high else f"delay {low} … {high}"]
@@ -246,4 +248,4 @@ class Told(NamedTuple):
 def told(left: Sequence[Pathway]) -> Told | None:
     """What a legend says of the bundles of these pathways, None without any."""
     ends = {strand.end for one in left for strand in one.strands}
-    return Told(tuple(end for end in DOES if end in ends), largest(left)) if left else None
+    return Told(tuple(end for end in SAID if end in ends), largest(left)) if left else None

@@ -217,7 +217,7 @@ def _room(word: float) -> float:
 def _bundle(told: Told, theme: Theme) -> LegendEntry:
     """Bands as they excite and inhibit, and what the widest stands for."""
     words = f"left out, added up: |Σ w| up to {texts.number(told.largest)}"
-    wide = [_room(texts.width(bundles.DOES[end], SMALL)) for end in told.ends]
+    wide = [_room(texts.width(bundles.SAID[end], SMALL)) for end in told.ends]
     across = max(sum(wide) + (len(wide) - 1) * _STROKE_GAP, texts.width(words, SMALL))
     shapes: list[Shape] = [heading("Bundle", theme)]
     x = 0.0
@@ -226,7 +226,7 @@ def _bundle(told: Told, theme: Theme) -> LegendEntry:
         tip = Arrowhead((x + _STROKE, SAMPLE_Y), (1.0, 0.0), _HEAD, 0.0, "")
         tip = ended(tip, 5.0, colour, end if theme.ends == "signs" else 1)
         shapes += [stroke(x, tip.notch[0] - x, colour, 5.0), tip]
-        shapes.append(Text((x, FIRST_Y), bundles.DOES[end], SMALL, theme.muted))
+        shapes.append(Text((x, FIRST_Y), bundles.SAID[end], SMALL, theme.muted))
         x += room + _STROKE_GAP
     shapes.append(Text((0, SECOND_Y), words, SMALL, theme.muted))
     return LegendEntry(tuple(shapes), across)
