@@ -338,6 +338,11 @@ class GroupModel(Model):
     ] = Field(
         None, description="Where the neuron is, as data: [x, y] or [x, y, z], a list of them, a file. It is no pin."
     )
+    ids: LabelsField | None = Field(
+        None,
+        description="What tables call the neurons, whatever characters that has: in edge files and by 'by'; a list, or "
+        "{file: …, column: …}.",
+    )
     label: Annotated[LabelsField, LABEL] | None = Field(
         None,
         description="Display text; a counted group may give a list, or {file: …, column: …}. May hold expressions: "

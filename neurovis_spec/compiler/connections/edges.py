@@ -92,6 +92,8 @@ class End:
     #: the names of all neurons of the network, and how many characters of them are the path of the scope
     called: tuple[str, ...]
     path: int
+    #: the neurons that tables call otherwise, by what they call them
+    by_id: Mapping[str, tuple[int, ...]]
 
     @cached_property
     def positions(self) -> Mapping[str, int] | Unknown:
@@ -103,13 +105,25 @@ class End:
     def indices(self, names: tuple[str, ...]) -> IntArray:
         """The position of each of these neurons; −1 where one cannot belong to the end, 0 where it may."""
         if self.positions is UNKNOWN:
-            return np.array([-1 if self.directory.find(name) is None else 0 for name in names], dtype=np.int64)
-        return np.array([self.positions.get(name, -1) for name in names], dtype=np.int64)
+            known = (self.directory.find(name) is not None or name in self.by_id for name in names)
+            return np.array([0 if one else -1 for one in known], dtype=np.int64)
+        places = {name: (self.positions.get(name, -1),) for name in names}
+        if self.by_id:
+            places |= {name: self.called_by(name) for name, (place,) in places.items() if place < 0}
+        return np.array([found[0] if len(found) == 1 else -1 for found in map(places.__getitem__, names)], np.int64)
+
+    def called_by(self, name: str) -> tuple[int, ...]:
+        """The positions within the end of the neurons that tables call so."""
+        if self.neurons is UNKNOWN or name not in self.by_id:
+            return ()
+        return tuple(np.flatnonzero(np.isin(self.neurons, self.by_id[name])).tolist())
 
     @property
     def names(self) -> Collection[str]:
-        """The neurons that may belong to it."""
-        return self.directory.neurons if self.positions is UNKNOWN else self.positions
+        """The neurons that may belong to it, by their names and what tables call them."""
+        if self.positions is UNKNOWN:
+            return self.directory.neurons
+        return [*self.positions, *(one for one in self.by_id if self.called_by(one))] if self.by_id else self.positions
 
     @property
     def size(self) -> float | Unknown:
@@ -227,6 +241,11 @@ class EdgeReader:
         if not name.strip():
             message = f"the {what} of an edge is the name of a neuron, this is empty"
             self.constants.findings.error("wrong-type", span, message)
+            return
+        if len(end.called_by(name)) > 1:
+            message = f"'{shorten(name)}'{where} is the id of {len(end.called_by(name))} {what}s of this entry"
+            hint = "name the neuron, or give the groups entries of their own"
+            self.constants.findings.error("edge-outside", span, message, hint, key=(what, where, name))
             return
         hint = suggest(name, few(name, end.names), "neurons" if end.positions is UNKNOWN else f"{what}s of this entry")
         message, lost = f"'{shorten(name)}'{where} is not among the {what}s of this entry", None

@@ -561,7 +561,8 @@ class EntryBuilder:
         assert self.body.edges is not None
         called, path = self.context.census.neurons.names, len(self.context.scope.called(""))
         sources, targets = (
-            End(neurons, self.context.directory, called, path) for neurons in (self.sources, self.targets)
+            End(neurons, self.context.directory, called, path, self.context.census.by_id)
+            for neurons in (self.sources, self.targets)
         )
         reader = EdgeReader(
             sources, targets, self.constants, self.context.scope.files, self._stream("weight"), self.context.room

@@ -7,7 +7,7 @@ neuron.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias, TypeVar
@@ -95,6 +95,8 @@ class Built(NamedTuple):
     #: the names of its neurons in their scope, and what stands at them in pictures
     names: tuple[str, ...]
     labels: tuple[str, ...]
+    #: what tables call its neurons, "" where they have no other name
+    ids: tuple[str, ...]
     #: the box of each, "" where it is in none, if a table says so
     boxes: tuple[str, ...]
     bias: FloatArray
@@ -176,6 +178,8 @@ class Builder:
         names, first_number = (UNKNOWN, None) if _may_lack_names(model) else self._names(name, model, start)
         n = UNKNOWN if names is UNKNOWN else len(names)
         table = TableReader(self.scope.files, names, self.scope.called(""))
+        ids = self._ids(model, names, table)
+        table = replace(table, ids=ids)
         kind = self._kind(name, model, n, table)
         self._check_combine(model, kind)
         self._check_softmax(model, kind)
@@ -197,6 +201,7 @@ class Builder:
             model=model,
             names=names,
             labels=known(labels, names),
+            ids=ids,
             boxes=self._boxes(model, table),
             bias=biases.pop(DRIVE, _defaults(n).bias),
             initial=_defaults(n).initial if initial is UNKNOWN else initial,
@@ -444,6 +449,27 @@ class Builder:
             return ()
         titles = known(table.texts(model.box, gaps=True), ())
         return tuple(title and self.scope.called(title) for title in titles)
+
+    def _ids(self, model: GroupModel, names: tuple[str, ...] | Unknown, table: TableReader) -> tuple[str, ...]:
+        """What tables call the neurons, each otherwise; nothing where that is not said, or invalid."""
+        if model.ids is None or names is UNKNOWN:
+            return ()
+        findings, node = self.constants.findings, model.source.get("ids")
+        if isinstance(model.ids, TableColumn):
+            (column,) = model.ids.columns
+            ids, spans = known(table.texts(model.ids, gaps=True), ()), [column.span] * len(names)
+        else:
+            ids, spans = tuple(one.value.strip() for one in model.ids), [one.span for one in model.ids]
+            if len(ids) != len(names):
+                message = f"'ids' has {plural(len(ids), 'text')} for {plural(len(names), 'neuron')}"
+                findings.error("wrong-size", model.source.span if node is None else node.span, message)
+                return ()
+        first: dict[str, str] = {}
+        for one, name, place in zip(ids, names, spans, strict=False):
+            if one and first.setdefault(one, name) != name:
+                message = f"'{shorten(one)}' is the id of '{first[one]}' and of '{name}'"
+                findings.error("duplicate-name", place, message, "give each neuron its own", key=name)
+        return ids
 
     def _labels(self, model: GroupModel, names: tuple[str, ...], table: TableReader) -> tuple[str, ...] | Unknown:
         """What stands at the neurons in pictures; UNKNOWN where that is invalid."""

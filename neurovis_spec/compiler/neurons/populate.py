@@ -99,6 +99,16 @@ class Census:
     directories: tuple[Directory, ...]
 
     @cached_property
+    def by_id(self) -> Mapping[str, tuple[int, ...]]:
+        """The neurons that tables call otherwise, by what they call them."""
+        found: dict[str, tuple[int, ...]] = {}
+        for built in self.groups:
+            for neuron, one in enumerate(built.ids, built.group.start):
+                if one:
+                    found[one] = (*found.get(one, ()), neuron)
+        return found
+
+    @cached_property
     def moving(self) -> Assembled:
         """The positions, x and y (and z) in turn, of which some may follow parameters."""
         axes, parts = self.neurons.position.shape[1], list[Part]()
