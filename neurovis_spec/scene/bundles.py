@@ -30,7 +30,7 @@ from neurovis_spec.scene.themes import mixed
 #: they get narrower.
 _WIDEST, _NARROWEST, _CROWD = 11.0, 1.8, 8
 #: More bundles than this are no help.
-_MOST = 2500
+_MOST = 5000
 #: How much of its colour there is in a band.
 _SHARE = 0.5
 #: Of the way between two hubs this is a band at least.
@@ -99,9 +99,11 @@ def bundled(left: Sequence[Pathway], ground: Ground, theme: Theme) -> Bundles:
         if group.count > 1 and group.name not in ground.named
     ]
     bundles = _drawn(left, hubs, ground.picture)
-    for one in bundles:
-        for band in one.bands:
-            obstacles.add_line(samples([band.line.points], 24)[0], band.width / 2 + 1.5)
+    bands = [band for one in bundles for band in one.bands]
+    dots = samples([band.line.points for band in bands], 24)
+    obstacles.add_line(
+        np.concatenate(dots), np.repeat([band.width / 2 + 1.5 for band in bands], [len(one) for one in dots])
+    )
     return Bundles(tuple(bundles), tuple(name for name in names if name is not None))
 
 

@@ -17,6 +17,8 @@ from neurovis_spec.layout.model import Point
 
 #: Hubs are so far apart, as a share of the picture's shorter side and at least, in page units.
 _APART, _LEAST = 0.22, 84.0
+#: More hubs than this have no room to be apart.
+_MOST = 400
 #: How far lines keep from a hub that stands among others, at most from one whose rim is free, and from a rim.
 _HUB, _MOST_RIM, _AIR = 9.0, 44.0, 2.0
 #: Hubs move within what holds all neurons but for this share on either side.
@@ -52,7 +54,9 @@ def hubs_of(members: Sequence[IntArray], centres: FloatArray, radii: FloatArray,
     x0, y0, x1, y1 = picture
     middles = np.array([centres[own].mean(axis=0) for own in members])
     low, high = (np.array([np.quantile(centres[own], rim, axis=0) for own in members]) for rim in (_RIM, 1 - _RIM))
-    at = _apart(middles, low, high, max(_LEAST, _APART * min(x1 - x0, y1 - y0)))
+    at, free = middles.copy(), np.flatnonzero([len(own) > 1 for own in members])
+    if len(free) <= _MOST:
+        at[free] = _apart(middles[free], low[free], high[free], max(_LEAST, _APART * min(x1 - x0, y1 - y0)))
     return [
         Hub((x, y), float(radii[own[0]])) if len(own) == 1 else Hub((x, y), _HUB, _alone(own, centres, radii))
         for own, (x, y) in zip(members, at.tolist(), strict=True)

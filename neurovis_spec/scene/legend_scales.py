@@ -31,8 +31,8 @@ _STROKE, _STROKE_GAP, _WIDEST = 36.0, 10.0, 8.6
 _SHORT, _NEAR, _APART, _PITCH = 22.0, 4.0, 9.0, 15.0
 #: the baseline of its first line
 _TABLE_Y = 26.0
-#: how wide the names of a scale may be
-_NAMES = 132.0
+#: how wide the names of a scale may be, and more than fit into that
+_NAMES, _FIT = 132.0, 30
 #: what goes less than this beyond a scale is not worth a word
 _BEYOND = 1.05
 #: what is said of a scale that is compressed, and how much farther apart its weights in a legend are
@@ -150,7 +150,7 @@ def named(scale: Scale) -> str:
     if not scale.names:
         return "others"
     names = [name.replace("->", "→") for name in scale.names]
-    for count in range(len(names), 0, -1):
+    for count in range(min(len(names), _FIT), 0, -1):
         more = f" + {len(names) - count} more" if count < len(names) else ""
         words = ", ".join(names[:count]) + more
         if texts.width(words, SMALL) <= _NAMES:

@@ -42,8 +42,8 @@ class Obstacles:
         """(k, 4) the room that texts have taken."""
         return np.array(self._texts, float).reshape(-1, 4)
 
-    def add_line(self, dots: FloatArray, reach: float = 2.5) -> None:
-        """One more line, as sample points."""
+    def add_line(self, dots: FloatArray, reach: float | FloatArray = 2.5) -> None:
+        """One more line, as sample points, all of one reach or each of its own."""
         self._dots = np.concatenate([self._dots, dots])
         self._reaches = np.concatenate([self._reaches, np.full(len(dots), reach)])
 
