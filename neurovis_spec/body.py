@@ -61,9 +61,9 @@ class Port:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A rigid part, drawn as a line with round ends between two points of the skeleton; the radius in metres. A part
-    that is wide and flat is several such lines beside each other, and what lies between them: ``beside`` are the ends
-    of the others, in their order."""
+    """A rigid part, drawn as a line with round ends between two points of the skeleton; the radius in metres. Where it
+    has another shape, it is all that lies within the radius of the convex hull of several lines: ``beside`` are the
+    ends of the others. So a box is four lines with no radius."""
 
     start: int
     end: int

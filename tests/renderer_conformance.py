@@ -24,6 +24,7 @@ from neurovis_spec.scene import (
     FlatSpline,
     Group,
     Image,
+    Polygon,
     Polyline,
     Ramp,
     Rectangle,
@@ -93,6 +94,8 @@ def _areas() -> list[Shape]:
         Polyline(tuple((10 + k, 115 + 15 * math.sin(k / 5) + (k % 7)) for k in range(180)), INK, 1.2),
         Spline(((10, 95), (70, 95), (130, 95), (190, 95)), INK, 2.0, (2.0, 4.0)),
         Polyline(((120, 20), (150, 60), (180, 30)), RED, 14.0, round=True),
+        Polygon(((150, 70), (190.5, 78.3), (186, 90), (164, 92.5)), GOLD),
+        Polygon(((140, 60), (120, 62), (128, 50)), BLUE, 3.0),
     ]
 
 

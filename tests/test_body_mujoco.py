@@ -142,9 +142,9 @@ def test_the_skeleton_has_links_feet_and_solids(tmp_path: Path) -> None:
         link = skeleton.links[number]
         return places[link.start].round(9).tolist(), places[link.end].round(9).tolist(), round(link.radius, 9)
 
-    assert skeleton.links[0].radius == pytest.approx(0.05), "a box is as thick as it is high"
+    assert skeleton.links[0].radius == 0, "a box lies between its corners"
     corners = places[list(skeleton.links[0].points)].round(9).tolist()
-    assert corners == [[-0.15, -0.05, 0.5], [0.15, -0.05, 0.5], [-0.15, 0.05, 0.5], [0.15, 0.05, 0.5]]
+    assert sorted(corners) == [[x, y, z] for x in (-0.2, 0.2) for y in (-0.1, 0.1) for z in (0.45, 0.55)]
     assert sorted(ends(1)[:2]) == [[0.2, 0.3, 0.5], [0.3, 0.3, 0.1]]
     assert ends(3) == ([0, 0, 0.5], [0.2, 0.3, 0.5], 0.008), "the leg does not meet the box: a thin link leads there"
     assert len(skeleton.links) == 4, "the prop meets the box, if not the round end of what is drawn of it"
@@ -160,13 +160,11 @@ def test_the_skeleton_has_links_feet_and_solids(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("geom", "high", "wide"),
     [
-        ('type="box" size="0.3 0.1 0.02"', (0.3, 0.1, 0.02), 2),
-        ('type="box" size="0.02 0.3 0.1"', (0.02, 0.3, 0.1), 2),
-        ('type="box" size="0.1 0.1 0.1"', (0.1, 0.1, 0.1), 1),
-        ('type="box" size="0.3 0.1 0.1"', (0.3, 0.1, 0.1), 1),
-        ('type="ellipsoid" size="0.3 0.1 0.02"', (0.3, 0.1, 0.02), 2),
-        ('type="cylinder" size="0.1 0.02"', (0.1, 0.1, 0.02), 8),
-        ('type="cylinder" size="0.02 0.3"', (0.02, 0.02, 0.3), 1),
+        ('type="box" size="0.3 0.1 0.02"', (0.3, 0.1, 0.02), 4),
+        ('type="box" size="0.1 0.1 0.1"', (0.1, 0.1, 0.1), 4),
+        ('type="ellipsoid" size="0.3 0.1 0.02"', (0.3, 0.1, 0.02), 25),
+        ('type="cylinder" size="0.1 0.02"', (0.1, 0.1, 0.02), 16),
+        ('type="mesh" mesh="octahedron"', (0.3, 0.2, 0.1), 3),
         ('type="capsule" size="0.02 0.3"', (0.02, 0.02, 0.32), 1),
         ('type="sphere" size="0.1"', (0.1, 0.1, 0.1), 1),
     ],
@@ -174,7 +172,10 @@ def test_the_skeleton_has_links_feet_and_solids(tmp_path: Path) -> None:
 def test_a_part_reaches_as_far_as_it_does(
     tmp_path: Path, geom: str, high: tuple[float, float, float], wide: int
 ) -> None:
-    body = opened(tmp_path, LEG.replace('<geom type="box" size="0.2 0.1 0.05"/>', f"<geom {geom}/>"))
+    text = LEG.replace('<geom type="box" size="0.2 0.1 0.05"/>', f"<geom {geom}/>")
+    vertices = "0.3 0 0 -0.3 0 0 0 0.2 0 0 -0.2 0 0 0 0.1 0 0 -0.1 0.05 0.01 0"
+    mesh = f'<asset><mesh name="octahedron" vertex="{vertices}"/></asset>'
+    body = opened(tmp_path, text.replace("<worldbody>", f"{mesh}<worldbody>"))
     skeleton = body.skeleton
     assert skeleton is not None
     link, places = skeleton.links[0], body.pose()[: 3 * len(skeleton.points)].reshape(-1, 3)

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from bodies_by_hand import HEIGHT, hexapod, posed
 from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
 from neurovis_renderers.animated_svg import AnimatedSvgRenderer
 from neurovis_renderers.canvas import paint
 from neurovis_renderers.frames import frames
@@ -25,7 +27,8 @@ from neurovis_spec.body import Link, Skeleton, Solid
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.drawing.drawing_settings import Panel
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.scene import THEMES, Disc, Film, Point, Polyline, Rectangle, Scene, Shape, Text, still
+from neurovis_spec.scene import THEMES, Disc, Film, Polygon, Polyline, Rectangle, Scene, Shape, Text, still
+from neurovis_spec.scene.body import PLOT, outline
 from neurovis_spec.scene.figure import PageGains, figure
 from neurovis_spec.scene.look import Look
 from neurovis_spec.scene.panels import ViewError
@@ -145,25 +148,80 @@ def test_a_wide_link_covers_what_lies_between_its_lines_and_no_more(side: str) -
     pose = np.concatenate([run.pose[:, :81], (corners + middles[:, None]).reshape(len(run), -1)], axis=1)
     scene = still(film(replace(run, pose=pose, skeleton=skeleton)), 20)
     metre = scale(scene)
-    *sides, inside = [shape for shape in shapes(scene, f"p0:{side}:links") if isinstance(shape, Polyline)]
-    assert [one.points for one in sides[:4]] == [one.points for one in sides[4:]], "casings, then the sides"
-    assert {round(one.width / metre, 9) for one in (*sides[4:], inside)} == {0.02}
-    drawn = np.array([one.points[0] for one in sides[4:]])
+    around, inside = [shape for shape in shapes(scene, f"p0:{side}:links") if isinstance(shape, Polygon)]
+    assert around.points == inside.points
+    assert inside.fill == THEMES["default"].zero
+    assert inside.margin == pytest.approx(0.01 * metre)
+    assert around.margin > inside.margin
     wanted = (corners[20] + middles[20])[:, [0, 1 if side == "above" else 2]] * metre
+    drawn = np.array(inside.points)
     assert np.ptp(drawn, axis=0) == pytest.approx(np.ptp(wanted, axis=0), abs=1e-6)
-    grid = np.array([(1 - s) * drawn[0] + s * drawn[1] + t * (drawn[3] - drawn[0]) for s in SHARES for t in SHARES])
-    edges = [edge for one in (*sides[4:], inside) for edge in pairwise(one.points)]
-    assert max(min(_distance(point, *edge) for edge in edges) for point in grid) <= inside.width / 2
+    assert len(drawn) == (4 if side == "above" else 2)
 
 
-SHARES = np.linspace(0, 1, 21)
+@given(st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), min_size=1, max_size=24))
+def test_an_outline_is_convex_and_holds_all_points(places: list[tuple[int, int]]) -> None:
+    found = outline([(float(x), float(y)) for x, y in places])
+    assert set(found) <= set(places)
+    for (x0, y0), (x1, y1) in zip(found, (*found[1:], found[0]), strict=True):
+        turns = [(x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) for x, y in places]
+        assert min(turns) >= 0
+    if len(found) > 2:
+        assert len(set(found)) == len(found)
 
 
-def _distance(point: FloatArray, start: Point, end: Point) -> float:
-    """How far a point is from a segment."""
-    along = np.subtract(end, start)
-    share = np.clip((point - start) @ along / max(along @ along, 1e-12), 0, 1)
-    return float(np.hypot(*(point - start - share * along)))
+# --- the way that it took ---------------------------------------------------------------------------------------------
+
+
+def way(scene: Scene) -> FloatArray:
+    (line,) = shapes(scene, "p0:above:way")
+    assert isinstance(line, Polyline)
+    return np.array(line.points)
+
+
+def test_from_above_the_way_so_far_lies_on_the_ground() -> None:
+    run = walked(2.0)
+    made, pose = film(run), run.pose
+    assert pose is not None
+    left, top, right, bottom = plot(made.scene, "above")
+    for frame in (1, 20, 59):
+        scene = still(made, frame)
+        middle, metre = np.array([(left + right) / 2, (top + bottom) / 2]), scale(scene)
+        passed = middle + (pose[: frame + 1, :2] - pose[frame, :2]) * (metre, -metre)
+        drawn = way(scene)
+        assert drawn[-1] == pytest.approx(middle)
+        assert drawn[0] == pytest.approx(passed[0]), "it began within the frame"
+        assert all(np.hypot(*(passed - point).T).min() < 1e-6 for point in drawn)
+    assert len(way(still(made, 59))) > 10
+
+
+def test_a_way_is_of_the_whole_run_whatever_frames_are_shown_and_of_one_episode() -> None:
+    run = walked()
+    assert run.pose is not None
+    alone = way(still(film(run), 40))
+    settings, steps = replace(WALKER.settings_for("default"), size=None), np.array([40])
+    look = Look(settings, (Panel("body"),), fps=20.0)
+    made = figure(WALKER.network, None, look, Shots(run, steps, steps), PageGains(None, None))
+    shown = way(still(made, 0))
+    assert np.ptp(shown, axis=0) / scale(still(made, 0)) == pytest.approx(
+        np.ptp(alone, axis=0) / scale(still(film(run), 40))
+    )
+    pose = run.pose.copy()
+    pose[30:, 0 : 3 * 27 : 3] -= 9.0  # it begins again elsewhere
+    parted = still(film(replace(run, pose=pose)), 40)
+    went = (pose[40, :2] - pose[30, :2]) * (1, -1) * scale(parted)
+    assert np.ptp(way(parted), axis=0) == pytest.approx(np.abs(went), abs=1e-6)
+
+
+def test_a_network_that_is_low_keeps_half_of_the_page() -> None:
+    low = nv.compile_text(SPEC + "layout: {engine: grid}\n")
+    run, rows = posed(low.run(), *hexapod(len(RUN), 0.0, ())), np.arange(2)
+    look = Look(low.settings_for("default"), (Panel("network"), Panel("body")), fps=20.0)
+    page = figure(low.network, low.placed(), look, Shots(run, rows, rows), PageGains(low.gains, low.gains)).scene
+    frame = next(group for group in page.groups if group.data.get("view") == "body").shapes[0]
+    assert isinstance(frame, Rectangle)
+    assert page.height - frame.corner[1] <= page.height / 2
+    assert 0.35 * PLOT < frame.height < PLOT
 
 
 def test_from_the_side_the_ground_is_where_feet_that_touch_are() -> None:
@@ -290,7 +348,7 @@ def test_of_solids_is_seen_what_stands_in_the_window() -> None:
 @pytest.mark.parametrize("turn", [0.0, 2.0])
 def test_a_group_has_shapes_of_the_same_kinds_in_all_frames(turn: float) -> None:
     made = film(walked(turn))
-    assert len(made.redrawn) == 6
+    assert len(made.redrawn) == 7
     for redrawn in made.redrawn.values():
         kinds = [[type(shape) for shape in redrawn(frame)] for frame in range(made.frames)]
         assert all(one == other for one, other in pairwise(kinds))
@@ -300,7 +358,7 @@ def test_the_animated_svg_shows_in_each_frame_what_its_still_shows() -> None:
     made = film(walked(2.0), rows=25)
     root = ET.fromstring(AnimatedSvgRenderer().animate(made, ".svg"))
     moving = [group for group in root.iter(NS + "g") if group.attrib.get("class") == "moving"]
-    assert len(moving) == 6
+    assert len(moving) == 7
     for frame in (0, 9, 24):
         drawn = ET.fromstring(SvgRenderer().draw(still(made, frame), ".svg"))
         seen = [shape for group in moving for shape in group if now(shape, "display", frame, 25) != "none"]

@@ -18,7 +18,7 @@ from test_live_browser import STEP, pause
 from test_live_everyone import violations
 
 import neurovis_spec as nv
-from neurovis_spec.body import Solid
+from neurovis_spec.body import Link, Solid
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.commands import REQUESTS
 from neurovis_spec.live.hub import Hub
@@ -29,6 +29,7 @@ from neurovis_spec.live.server import Server
 from neurovis_spec.live.source import Source
 from neurovis_spec.live.view import view_of
 from neurovis_spec.scene import THEMES, channels
+from neurovis_spec.scene.body import mixed
 
 pytestmark = pytest.mark.browser
 
@@ -128,6 +129,36 @@ def test_a_foot_that_touches_is_seen_where_another_of_its_leg_is_in_the_air(tmp_
             assert (await said(opened)).startswith("the body 0.00 m forward, 6 of 12 feet touching;")
             seen = await pixels(opened)
             assert (seen == channels(THEMES["default"].positive)).all(axis=2).sum() > 6 * 30
+
+    asyncio.run(look())
+
+
+def test_a_box_covers_its_outline_and_the_way_so_far_is_seen_behind_it(tmp_path: Path) -> None:
+    """A box of 30 by 10 by 4 cm, by its edges along the way; the colour of the way is no other's."""
+    skeleton, poses = hexapod(len(RUN), 0.0)
+    first, count = len(skeleton.points), 3 * len(skeleton.points)
+    corners = np.array([[x, y, z] for y in (-0.05, 0.05) for z in (-0.02, 0.02) for x in (-0.15, 0.15)])
+    at = (poses[:, None, :3] + corners).reshape(len(poses), -1)
+    edges = tuple((first + number, first + number + 1) for number in range(0, 8, 2))
+    box = replace(skeleton, points=(*skeleton.points, *"abcdefgh"), links=(Link(*edges[0], 0.0, edges[1:]),), feet=())
+    source = RecordedSource(NETWORK.network, posed(RUN, box, np.concatenate([poses[:, :count], at], axis=1)))
+    theme = THEMES["default"]
+
+    async def look() -> None:
+        async with shown(source, tmp_path) as opened:
+            for step in range(0, 50, 7):
+                await go(opened, step)
+            seen = await pixels(opened)
+            covered = (seen == channels(theme.zero)).all(axis=2)
+            half = covered.shape[1] // 2
+            above, beside = covered[:, :half], covered[:, half:]
+            wide = [np.ptp(np.flatnonzero(one.any(axis=0))) for one in (above, beside)]
+            assert wide[0] == pytest.approx(wide[1], abs=2)
+            assert above.sum() == pytest.approx(wide[0] ** 2 / 3, rel=0.06)
+            assert beside.sum() == pytest.approx(wide[1] ** 2 * 4 / 30, rel=0.08)
+            trail = (np.abs(seen - channels(mixed(theme.positive, theme.box_fill, 0.55))).sum(axis=2) < 6)[:, :half]
+            assert trail.sum() > 20
+            assert np.flatnonzero(trail.any(axis=0)).max() <= np.flatnonzero(above.any(axis=0)).min() + 2
 
     asyncio.run(look())
 

@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pypdfium2
 import pytest
-from neurovis_renderers import truetype
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from neurovis_renderers import coverage, truetype
 from neurovis_renderers.animated_svg import AnimatedSvgRenderer
 from neurovis_renderers.canvas import paint
 from neurovis_renderers.frames import frames
@@ -42,6 +44,39 @@ def page(data: bytes, pixels: tuple[int, int]) -> Pillow.Image:
     assert len(document) == 1
     shown: Pillow.Image = document[0].render(scale=pixels[0] / document[0].get_width()).to_pil().convert("RGB")
     return shown if shown.size == pixels else shown.resize(pixels)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.floats(0, 6.28), min_size=1, max_size=9, unique=True),
+    st.floats(2, 30),
+    st.floats(0, 12),
+    st.tuples(st.floats(-20, 60), st.floats(-20, 60)),
+)
+def test_a_polygon_covers_as_much_as_it_is_large_also_where_others_lie_in_front(
+    angles: list[float], radius: float, margin: float, centre: tuple[float, float]
+) -> None:
+    """Corners on a circle, and all that lies within a margin of them, on a page that it leaves at any side."""
+    ways = np.sort(np.array(angles))
+    corners = np.array(centre) + radius * np.stack([np.cos(ways), np.sin(ways)], axis=1)
+    made = coverage.rounded(corners[None], np.array([margin]))
+    found = coverage.polygons(made - (-100, -100), (300, 300))
+    edges = np.roll(corners, -1, axis=0) - corners
+    inner = 0.5 * abs(
+        float((corners[:, 0] * np.roll(corners[:, 1], -1) - corners[:, 1] * np.roll(corners[:, 0], -1)).sum())
+    )
+    area = inner + margin * float(np.hypot(*edges.T).sum()) + np.pi * margin**2
+    assert float(found.shares.sum()) == pytest.approx(area, rel=0.03, abs=1.0)
+    page = coverage.polygons(made, (40, 40))
+    there = np.zeros(300 * 300)
+    there[found.pixels] = found.shares
+    seen = np.zeros(40 * 40)
+    seen[page.pixels] = page.shares
+    assert seen.reshape(40, 40) == pytest.approx(there.reshape(300, 300)[100:140, 100:140], abs=1e-4)
+    both = coverage.polygons(np.concatenate([made, made]) - (-100, -100), (300, 300))
+    assert (both.only(both.owners == 1).shares.sum()) == pytest.approx(float(found.shares.sum()), rel=1e-5)
+    whole = np.flatnonzero(there == 1)
+    assert not np.isin(both.only(both.owners == 0).pixels, whole).any()
 
 
 @pytest.mark.parametrize("name", SCENES)

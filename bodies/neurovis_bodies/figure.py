@@ -1,15 +1,16 @@
 """How a model of MuJoCo is drawn: links, feet, what stands in the world.
 
 In: a model. Out: a Figure: its Skeleton, and the pose of some data of it. A link is a part that moves, as large as it
-is: as thick as it is along its shortest edge, with lines along its longest as far apart as it is wide. Where the parts
-of two bodies do not meet, a thin link leads from the origin of one to that of the other. Feet are where there are touch
-sensors, and parts that are called feet.
+is: a capsule as its middle line with its radius, what has another shape by points of its surface, between which it
+lies. Where the parts of two bodies do not meet, a thin link leads from the origin of one to that of the other. Feet are
+where there are touch sensors, and parts that are called feet.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import product
 from typing import Final, NamedTuple
 
 import mujoco
@@ -22,35 +23,40 @@ _SHOWN: Final = 2
 #: of a thin link, as a share of the thinnest other, or in metres
 _THIN: Final = 0.4
 _THINNEST: Final = 0.005
-#: what is wider than thick by so little is a line
-_NARROW: Final = 0.01
-#: lines through a disc, between the corners of a regular polygon: how far aside, and how long, as shares of its radius
-_CHORDS: Final = tuple((math.sin(a), math.cos(a)) for a in (math.pi * (k - 3.5) / 8 for k in range(8)))
+
+
+def _units(ways: Iterable[tuple[int, ...]]) -> FloatArray:
+    """Vectors of length 1."""
+    found = np.array(list(ways), dtype=np.float64)
+    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
+
+
+#: how many points there are around a rim, and of an ellipsoid the share of its shortest half axis that is its radius
+_RIM: Final = 16
+_ROUNDED: Final = 0.7
+#: the corners of a cube; ways along the axes, and between two and three of them; further ones, between two axes
+_CORNERS: Final = np.array(list(product((-1.0, 1.0), repeat=3)))
+_WAYS: Final = _units(way for way in product((-1, 0, 1), repeat=3) if any(way))
+_FURTHER: Final = _units(way for way in product((-2, -1, 0, 1, 2), repeat=3) if sorted(map(abs, way)) == [0, 1, 2])
+_ALL_WAYS: Final = np.concatenate([_WAYS, _FURTHER])
 
 
 class _Part(NamedTuple):
-    """A part of a body in the frame of the body: all that lies within ``radius`` of a flat core, which reaches ``half``
-    to either side of its ``centre`` along the columns of ``turned`` (3, 3); ``round``: the core is a disc."""
+    """A part of a body in the frame of the body: about all that lies within ``radius`` of a flat core, which reaches
+    ``half`` to either side of its ``centre`` along the columns of ``turned`` (3, 3); exactly, all that lies within
+    ``margin`` of the convex hull of ``points`` (k, 3) there, an even number of them."""
 
     centre: FloatArray
     turned: FloatArray
     half: FloatArray
     radius: float
-    round: bool = False
+    points: FloatArray
+    margin: float
 
     def lines(self) -> list[tuple[FloatArray, FloatArray]]:
-        """Lines along the longest edge of the core that it lies between: their ends."""
-        across, along = np.argsort(self.half, kind="stable")[1:].tolist()
-        wide = float(self.half[across])
-        if wide <= _NARROW * self.radius:
-            off = self.turned[:, along] * self.half[along]
-            return [(self.centre - off, self.centre + off)]
-        found = []
-        for at, share in _CHORDS if self.round else ((-1.0, 1.0), (1.0, 1.0)):
-            middle = self.centre + self.turned[:, across] * (at * wide)
-            off = self.turned[:, along] * (self.half[along] * share)
-            found.append((middle - off, middle + off))
-        return found
+        """Lines that it lies between: their ends."""
+        points = self.centre + self.points @ self.turned.T
+        return list(zip(points[::2], points[1::2], strict=True))
 
     def distance(self, point: FloatArray) -> float:
         """How far a point is from the core."""
@@ -117,7 +123,7 @@ class Figure:
         (start, end), *beside = [
             (self._point(model, body, start), self._point(model, body, end)) for start, end in part.lines()
         ]
-        return Link(start, end, part.radius, tuple(beside))
+        return Link(start, end, part.margin, tuple(beside))
 
     def _point(self, model: mujoco.MjModel, body: int, place: FloatArray) -> int:
         """The index of a point of a body; those at one place are one."""
@@ -137,6 +143,8 @@ _TOUCH: Final = int(mujoco.mjtSensor.mjSENS_TOUCH)
 _SPHERE: Final = int(mujoco.mjtGeom.mjGEOM_SPHERE)
 _CAPSULE: Final = int(mujoco.mjtGeom.mjGEOM_CAPSULE)
 _CYLINDER: Final = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+_ELLIPSOID: Final = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
+_MESH: Final = int(mujoco.mjtGeom.mjGEOM_MESH)
 #: what is long along its own z
 _LONG: Final = (_CAPSULE, _CYLINDER)
 _GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
@@ -168,19 +176,42 @@ def _parts(model: mujoco.MjModel, body: int) -> Iterator[_Part]:
         centre, turned = np.array(model.geom_pos[geom]), _turned(model.geom_quat[geom])
         if kind in _GROUND:
             continue
-        box = np.array([size[0], size[0], size[1]])
+        off, box = model.geom_aabb[geom][:3], np.array(model.geom_aabb[geom][3:])  # in the frame of the geom
+        if kind in _LONG:
+            off, box = np.zeros(3), np.array([size[0], size[0], size[1]])
+        radius, margin = float(box.min()), 0.0
+        half = box - radius
         if kind == _SPHERE:
-            half, radius = np.zeros(3), float(size[0])
+            half, radius, margin, points = np.zeros(3), float(size[0]), float(size[0]), np.zeros((2, 3))
         elif kind == _CAPSULE:
-            half, radius = np.array([0, 0, size[1]]), float(size[0])
+            half, radius, margin = np.array([0, 0, size[1]]), float(size[0]), float(size[0])
+            points = np.array([-half, half])
+        elif kind == _CYLINDER:
+            points = _rims(*box[1:].tolist())
+        elif kind == _ELLIPSOID:
+            margin = _ROUNDED * radius
+            points = _ALL_WAYS * (box - margin)
         else:
-            if kind != _CYLINDER:
-                centre = centre + turned @ model.geom_aabb[geom][:3]  # in the frame of the geom: its centre, half edges
-                box = np.array(model.geom_aabb[geom][3:])
-            radius = float(box.min())
-            half = box - radius
-        if np.isfinite([*centre, *half, radius]).all():
-            yield _Part(centre, turned, half, radius, kind == _CYLINDER)
+            points = _corners(model, geom) if kind == _MESH else _CORNERS * box
+            points = points - off if kind == _MESH else points
+        if np.isfinite([*centre, *half, radius, *points.ravel()]).all():
+            yield _Part(centre + turned @ off, turned, half, radius, points, margin)
+
+
+def _rims(radius: float, half: float) -> FloatArray:
+    """Points of the rims of a cylinder along z, those at both ends of a line in turn."""
+    angles = 2 * math.pi * np.arange(_RIM) / _RIM
+    ends = [np.stack([radius * np.cos(angles), radius * np.sin(angles), 0 * angles + z], axis=1) for z in (-half, half)]
+    return np.stack(ends, axis=1).reshape(-1, 3)
+
+
+def _corners(model: mujoco.MjModel, geom: int) -> FloatArray:
+    """The corners of a mesh that lie furthest out in many ways, in the frame of its geom, an even number of them."""
+    mesh = int(model.geom_dataid[geom])
+    start = int(model.mesh_vertadr[mesh])
+    vertices = np.array(model.mesh_vert[start : start + int(model.mesh_vertnum[mesh])], dtype=np.float64)
+    furthest = np.unique((vertices @ _WAYS.T).argmax(axis=0))
+    return vertices[[*furthest, *furthest[: len(furthest) % 2]]]
 
 
 def _is_apart(model: mujoco.MjModel, body: int, parts: dict[int, list[_Part]]) -> bool:

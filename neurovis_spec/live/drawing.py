@@ -31,6 +31,7 @@ from neurovis_spec.scene import (
     Disc,
     Group,
     Image,
+    Polygon,
     Polyline,
     Ramp,
     Rectangle,
@@ -105,6 +106,8 @@ def _shape(shape: Shape) -> dict[str, object]:
             what = {"kind": "line", "points": _points(shape.points), "stroke": shape.stroke, "width": shape.width}
             flat = {"flat": True} if shape.flat else {}
             return {**what, "dash": list(shape.dash), **flat, "opacity": shape.opacity}
+        case Polygon():
+            return {"kind": "polygon", "points": _points(shape.points), "fill": shape.fill, "width": 2 * shape.margin}
         case Arrowhead():
             (dx, dy), what = shape.direction, {"kind": "head", "at": _points([shape.tip]), "fill": shape.fill}
             more = {

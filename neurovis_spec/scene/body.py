@@ -1,8 +1,8 @@
 """The body: its pose from above and from its right side, in metres, as it moves over the ground.
 
 In: Poses. Out: a Part: two drawings of the same scale beside each other, forward to the right, that follow the body's
-middle, over a grid of the ground with how far it has come; links as thick as they are, feet that touch something filled
-and others hollow, solids, a scale bar.
+middle, over a grid of the ground with how far it has come and, from above, the way that it took; the outlines of links,
+feet that touch something filled and others hollow, solids, a scale bar.
 """
 
 from __future__ import annotations
@@ -11,15 +11,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Literal, TypeAlias
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
-from neurovis_spec.body import Solid
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.body import Link, Solid
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.model import Disc, Group, Point, Polyline, Rectangle, Redrawn, Shape, Text, Theme
+from neurovis_spec.scene.model import Disc, Group, Point, Polygon, Polyline, Rectangle, Redrawn, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
 from neurovis_spec.scene.poses import Poses
 from neurovis_spec.scene.strips import SMALL, TITLE, words
@@ -36,8 +35,8 @@ _APART, _BAR = 46.0, 50.0
 #: Lines around links, the least thickness of these; the radius of a foot in those of its links, at least and at most.
 _CASING, _THIN = 1.3, 2.2
 _FOOT, _LEAST, _LARGEST = 1.25, 3.4, 9.0
-#: How far apart rows are that cover a wide link, and how far within it they turn, in its thickness.
-_ROW, _WITHIN = 0.9, 0.25
+#: The way that a body took: how wide its line is, how much of its colour is left, how long its pieces are.
+_WAY, _PALE, _PIECE = 2.0, 0.55, 4.0
 #: Lines that lie on the ground, and how much of a link's colour is left on the far side.
 _LINE, _FAR = 0.8, 0.45
 #: What lies so far aside of the middle, as a share of what the body reaches aside, is on the near or the far side.
@@ -76,6 +75,8 @@ class BodyPicture:
             groups.append(Group(tuple(_ground(drawn)), f"{name}:ground", data))
             moving: list[tuple[str, Redrawn, str]] = [("world", drawn.world, ""), ("links", drawn.links, drawn.said)]
             moving.append(("come", drawn.come, "") if drawn is beside else ("bar", drawn.bar, ""))
+            if drawn is above:
+                moving.insert(1, ("way", drawn.way, ""))
             for what, shapes, said in moving:
                 redrawn[f"{name}:{what}"] = shapes
                 groups.append(Group(shapes(0), f"{name}:{what}", {"body": what} if said else {}, said))
@@ -183,15 +184,14 @@ class _Drawn:
         places, shapes = self._places(frame), list[Shape]()
         order = self._order(frame)
         for number in np.argsort(order, kind="stable").tolist():
-            link = skeleton.links[number]
-            thick = max(2 * link.radius * self.scale, _THIN)
-            lines, colour = [(places[a], places[b]) for a, b in link.lines], self._seen(theme.zero, order[number])
-            sides = _around(lines)
-            shapes += [Polyline(side, theme.box_fill, thick + 2 * _CASING, round=True) for side in sides]
-            shapes += [Polyline(side, colour, thick, round=True) for side in sides]
+            link, colour = skeleton.links[number], self._seen(theme.zero, order[number])
             if link.beside:
-                inside = _to_and_fro(lines, self._rows[number], _WITHIN * thick)
-                shapes.append(Polyline(inside, colour, thick, round=True))
+                corners, margin = outline([places[point] for point in link.points]), link.radius * self.scale
+                shapes += [Polygon(corners, theme.box_fill, margin + _CASING), Polygon(corners, colour, margin)]
+                continue
+            line, thick = (places[link.start], places[link.end]), max(2 * link.radius * self.scale, _THIN)
+            shapes.append(Polyline(line, theme.box_fill, thick + 2 * _CASING, round=True))
+            shapes.append(Polyline(line, colour, thick, round=True))
         order = self._layers([(foot,) for foot in skeleton.feet], frame) * (self.side == "side")
         for number in np.lexsort((poses.touching[frame], order)).tolist():
             touches = poses.touching[frame, number]
@@ -200,18 +200,29 @@ class _Drawn:
             shapes.append(Disc(places[skeleton.feet[number]], self._feet[number], fill, edge, 1.4))
         return tuple(shapes)
 
+    def way(self, frame: int) -> tuple[Shape, ...]:
+        """The way of the middle so far, from where it came into the frame for the last time, or began; nothing of it
+        where the pose is not known."""
+        poses, colour = self.poses, mixed(self.theme.positive, self.theme.box_fill, _PALE)
+        if not poses.known[frame]:
+            return (Polyline(((-1e4, -1e4),) * 2, colour, _WAY),)
+        row = int(poses.rows[frame])
+        first, last = np.searchsorted(self._marks, (poses.begun[row] + 1, row))
+        passed = poses.way[[poses.begun[row], *self._marks[first:last], row]]
+        seen = _last_within((passed - poses.way[row]) * (self.scale, -self.scale), self._half)
+        points = seen + np.array([(self.left + self.right) / 2, (self.top + self.bottom) / 2])
+        return (Polyline(tuple((x, y) for x, y in points.tolist()), colour, _WAY),)
+
+    @property
+    def _half(self) -> FloatArray:
+        return np.array([(self.right - self.left) / 2, self.plot / 2])
+
     @cached_property
-    def _rows(self) -> list[list[int]]:
-        """Of each link, into how many rows what lies between two of its lines is cut, so that these leave no gap."""
-        points = self.poses.points[self.poses.known]
-        rows = []
-        for link in self.poses.skeleton.links:
-            thick = max(2 * link.radius * self.scale, _THIN)
-            starts, ends = (points[:, [line[side] for line in link.lines]] for side in (0, 1))
-            gaps = np.maximum(*(np.linalg.norm(np.diff(some, axis=1), axis=2) for some in (starts, ends)))
-            far = self.scale * gaps.max(axis=0, initial=0.0)
-            rows.append([max(1, math.ceil(gap / (_ROW * thick))) for gap in far.tolist()])
-        return rows
+    def _marks(self) -> IntArray:
+        """The rows of a run between which the way of the middle is drawn straight."""
+        pieces = np.floor(np.cumsum(np.nan_to_num(self.poses.steps)) * self.scale / _PIECE)
+        marks: IntArray = np.flatnonzero(np.diff(pieces, prepend=0.0) > 0)
+        return marks
 
     def _seen(self, colour: str, order: float) -> str:
         """A colour, paler on the far side."""
@@ -237,7 +248,7 @@ class _Drawn:
 
     def _order(self, frame: int) -> FloatArray:
         """Links from back to front. From above, what reaches higher is in front, in the middle of all frames, so that
-        it always is; from the side what is right of the body, and of what is in the middle the thickest."""
+        it always is; from the side what is right of the body, and of what is in the middle the largest."""
         links, points = self.poses.skeleton.links, self.poses.points
         radii = np.array([link.radius for link in links])
         if self.side == "above":
@@ -245,9 +256,15 @@ class _Drawn:
             tops: FloatArray = np.array([heights[list(link.points)].mean() for link in links]) + radii
             return tops.round(6)
         layers = self._layers([link.points for link in links], frame)
-        thick: FloatArray = 0.5 * radii / max(float(radii.max(initial=0.0)), 1e-300)
+        large = radii + [self._half_length(link, frame) if link.beside else 0.0 for link in links]
+        thick: FloatArray = 0.5 * large / max(float(large.max(initial=0.0)), 1e-300)
         order: FloatArray = np.where(layers == 0, thick, layers)
         return order
+
+    def _half_length(self, link: Link, frame: int) -> float:
+        """Half of how far the points of a link are from its first one, at most."""
+        points = self.poses.points[frame][list(link.points)]
+        return float(np.linalg.norm(points - points[0], axis=1).max()) / 2
 
     def _layers(self, ends: Sequence[Sequence[int]], frame: int) -> FloatArray:
         """On which side of the body something is that lies between points: −1 on the far side, 1 on the near one."""
@@ -277,41 +294,46 @@ class _Drawn:
         return Polyline(line, theme.ink, 1.4), Text(middle, said, SMALL, theme.ink, "middle", halo=theme.box_fill)
 
 
-def _around(lines: Sequence[tuple[Point, Point]]) -> list[tuple[Point, Point]]:
-    """The sides of what lies between lines beside each other; a single line is its only one.
+def _last_within(way: FloatArray, half: FloatArray) -> FloatArray:
+    """The last stretch of a way (k, 2), which ends at the middle of a frame, that lies within so much of that, (2,).
 
-    >>> _around([((0.0, 0.0), (4.0, 0.0)), ((0.0, 2.0), (4.0, 2.0))])[:2]
-    [((0.0, 0.0), (0.0, 2.0)), ((0.0, 2.0), (4.0, 2.0))]
+    >>> _last_within(np.array([[-9.0, 0.0], [-3.0, 3.0], [0.0, 0.0]]), np.array([5.0, 5.0])).tolist()
+    [[-5.0, 2.0], [-3.0, 3.0], [0.0, 0.0]]
     """
-    if len(lines) == 1:
-        return [lines[0]]
-    corners = [start for start, _ in lines] + [end for _, end in reversed(lines)]
-    return list(pairwise([*corners, corners[0]]))
+    outside = np.flatnonzero(~(np.abs(way) <= half).all(axis=1))
+    if not len(outside):
+        return way if len(way) > 1 else np.repeat(way, 2, axis=0)
+    inner = way[outside[-1] + 1 :]
+    back = way[outside[-1]] - inner[0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.nanmin((np.copysign(half, back) - inner[0]) / back)
+    result: FloatArray = np.concatenate([inner[:1] + share * back, inner])
+    return result
 
 
-def _to_and_fro(lines: Sequence[tuple[Point, Point]], rows: Sequence[int], within: float) -> tuple[Point, ...]:
-    """A line that covers what lies between lines: along so many rows from each to the next, turning so far within.
+def outline(points: Sequence[Point]) -> tuple[Point, ...]:
+    """The corners of the convex hull of points, in order.
 
-    >>> _to_and_fro([((0.0, 0.0), (8.0, 0.0)), ((0.0, 2.0), (8.0, 2.0))], [2], 0.5)
-    ((0.5, 0.0), (7.5, 0.0), (7.5, 1.0), (0.5, 1.0), (0.5, 2.0), (7.5, 2.0))
+    >>> outline([(0.0, 0.0), (2.0, 0.0), (1.0, 1.0), (2.0, 2.0), (0.0, 2.0)])
+    ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
     """
-    made = [lines[0]]
-    for one, other, count in zip(lines, lines[1:], rows, strict=False):
-        made += [
-            (_between(one[0], other[0], k / count), _between(one[1], other[1], k / count)) for k in range(1, count)
-        ]
-        made.append(other)
-    points: list[Point] = []
-    for number, (start, end) in enumerate(made):
-        share = min(0.5, within / max(math.dist(start, end), 1e-9))
-        ends = _between(start, end, share), _between(start, end, 1 - share)
-        points += ends[::-1] if number % 2 else ends
-    return tuple(points)
+    some = sorted(set(points))
+    if len(some) < 3:
+        return tuple(some)
+    return (*_chain(some), *_chain(some[::-1]))
 
 
-def _between(one: Point, other: Point, share: float) -> Point:
-    """The point so far on the way from one to the other."""
-    return one[0] + share * (other[0] - one[0]), one[1] + share * (other[1] - one[1])
+def _chain(points: Sequence[Point]) -> list[Point]:
+    """The corners on one side, from the first point up to the last, without that."""
+    found: list[Point] = []
+    for x, y in points:
+        while len(found) > 1:
+            (x0, y0), (x1, y1) = found[-2:]
+            if (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) > 0:
+                break
+            found.pop()
+        found.append((x, y))
+    return found[:-1]
 
 
 def _ground(drawn: _Drawn) -> list[Shape]:

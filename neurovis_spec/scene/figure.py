@@ -27,7 +27,7 @@ from neurovis_spec.scene.poses import Poses
 from neurovis_spec.scene.shots import Shots
 from neurovis_spec.scene.strips import Span
 from neurovis_spec.scene.themes import theme_of
-from neurovis_spec.scene.views import AXIS, Block, BlockSpace, Drawing, Maker, span_of
+from neurovis_spec.scene.views import AXIS, Block, BlockSpace, Drawing, Embodied, Maker, span_of
 
 #: How wide a page without a picture of the network is, and the least with one (user units).
 PAGE = 760.0
@@ -72,7 +72,7 @@ def figure(network: Network, layout: Layout | None, look: Look, shots: Shots, ga
         assert gains.picture is not None
         own, narrowest = _beside(settings, blocks, _head(title, sheet.width)), PAGE if others else 0.0
         picture = film(network, layout, shots.snapshots(network), gains.picture, own, look.fps or 1.0, narrowest)
-        blocks = [others.get(number, Drawing(picture)) for number in range(len(look.panels))]
+        blocks = [_beneath(others[k], picture) if k in others else Drawing(picture) for k in range(len(look.panels))]
         density = picture.scene.density
         sheet = _Sheet(picture.scene.width, None if settings.size is None else settings.size[1] / density, density)
     span = span_of(blocks, shots, sheet.width, network.shown_dt)
@@ -116,12 +116,22 @@ def _placed(
 def with_body(picture: Film, poses: Poses) -> Film:
     """A film of a network with the body below it, in the pose of each frame."""
     scene, body = picture.scene, BodyPicture(poses)
-    part = body.part(MARGIN, scene.width - MARGIN, PLOT, scene.theme, "body:")
+    part = body.part(MARGIN, scene.width - MARGIN, _plot(body, picture), scene.theme, "body:")
     top = scene.height + _GAP
     height = whole(top + part.height + _FOOT)
     words = picture.caption, picture.captions, picture.titles
     page = Page(scene.width, height, scene.density, scene.theme, scene.title, picture.fps, *words)
     return stacked(page, [(0.0, Part(scene.groups, scene.height)), (top, part)], picture)
+
+
+def _beneath(block: Block, picture: Film) -> Block:
+    """A view on a page with the picture of the network."""
+    return replace(block, plot=_plot(block.picture, picture)) if isinstance(block, Embodied) else block
+
+
+def _plot(body: BodyPicture, picture: Film) -> float:
+    """How high the drawings of a body are, of a page of which the network keeps at least half."""
+    return min(PLOT, max(picture.scene.height - body.fixed - _GAP - _FOOT, _LEAST * PLOT))
 
 
 def _captions(network: Network, shots: Shots) -> list[str]:

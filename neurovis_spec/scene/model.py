@@ -141,6 +141,16 @@ def ended(head: Arrowhead, width: float, fill: str, end: int) -> Arrowhead:
 
 
 @dataclass(frozen=True, slots=True)
+class Polygon:
+    """A filled convex polygon, by its corners in order, with all that lies within a margin of it: so its corners are
+    round."""
+
+    points: tuple[Point, ...]
+    fill: str
+    margin: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Rectangle:
     """A rectangle with round corners."""
 
@@ -204,7 +214,7 @@ def shifted(shape: Shape, by: Point) -> Shape:
     match shape:
         case Disc():
             return replace(shape, centre=move(shape.centre))
-        case Spline() | Polyline():
+        case Spline() | Polyline() | Polygon():
             return replace(shape, points=tuple(move(point) for point in shape.points))
         case Arrowhead():
             return replace(shape, tip=move(shape.tip))
@@ -214,7 +224,7 @@ def shifted(shape: Shape, by: Point) -> Shape:
             return replace(shape, point=move(shape.point))
 
 
-Shape: TypeAlias = Disc | Spline | Polyline | Arrowhead | Rectangle | Ramp | Image | Text
+Shape: TypeAlias = Disc | Spline | Polyline | Polygon | Arrowhead | Rectangle | Ramp | Image | Text
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.runtime.recording import Recording
 
@@ -34,11 +34,13 @@ class Reach:
 @dataclass(frozen=True)
 class Poses:
     """The poses of frames, ``values`` (frames, size); ``start`` is where the middle was when the run began (x and y in
-    metres)."""
+    metres). ``run`` is where the middle was at all rows of that, (rows, 2), and the row of each frame, (frames,);
+    without it frames are all that is known of it."""
 
     skeleton: Skeleton
     values: FloatArray
     start: tuple[float, float]
+    run: tuple[FloatArray, IntArray] | None = None
 
     @cached_property
     def known(self) -> npt.NDArray[np.bool_]:
@@ -64,6 +66,30 @@ class Poses:
         return self.points[:, self.skeleton.middle, :2]
 
     @cached_property
+    def way(self) -> FloatArray:
+        """Where the middle was at all rows of the run, (rows, 2)."""
+        return np.where(self.known[:, None], self.middles, np.nan) if self.run is None else self.run[0]
+
+    @cached_property
+    def rows(self) -> IntArray:
+        """The row of each frame, (frames,)."""
+        return np.arange(len(self.values)) if self.run is None else self.run[1]
+
+    @cached_property
+    def steps(self) -> FloatArray:
+        """How far the middle went to each row, (rows,); NaN where it did not come from the row before: in an episode of
+        its own, or after a pose that is not known."""
+        far = np.hypot(*np.diff(self.way, axis=0, prepend=np.nan).T)
+        return np.where(far <= 2 * self.reach.ahead, far, np.nan)
+
+    @cached_property
+    def begun(self) -> IntArray:
+        """The row in which the way to each row began, (rows,)."""
+        begins = np.where(np.isnan(self.steps), np.arange(len(self.steps)), 0)
+        result: IntArray = np.maximum.accumulate(begins)
+        return result
+
+    @cached_property
     def forward(self) -> FloatArray:
         """How far it has come forward since the run began, (frames,)."""
         return self.middles[:, 0] - self.start[0]
@@ -84,6 +110,11 @@ def posed_of(recording: Recording) -> tuple[Skeleton, FloatArray] | None:
     """The skeleton and the poses (rows, size) of a recording; None where it has none."""
     pose, skeleton = recording.pose, recording.skeleton
     return None if pose is None or skeleton is None or not skeleton.points else (skeleton, pose)
+
+
+def middles_of(skeleton: Skeleton, values: FloatArray) -> FloatArray:
+    """Where the middle is in poses (rows, size), (rows, 2)."""
+    return values[:, 3 * skeleton.middle : 3 * skeleton.middle + 2]
 
 
 def start_of(skeleton: Skeleton, first: FloatArray) -> tuple[float, float]:

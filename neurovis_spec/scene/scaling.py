@@ -19,7 +19,7 @@ Scaled = TypeVar("Scaled", bound="DataclassInstance")
 #: A length, a place, or several of either.
 _Extent: TypeAlias = "float | tuple[_Extent, ...]"
 
-_LENGTHS = {"radius", "width", "height", "length", "half_width", "stroke_width", "size", "head", "dash"}
+_LENGTHS = {"radius", "margin", "width", "height", "length", "half_width", "stroke_width", "size", "head", "dash"}
 _MEASURED = _LENGTHS | {"centre", "corner", "point", "points", "tip", "tail"}
 
 

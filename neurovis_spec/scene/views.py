@@ -29,7 +29,7 @@ from neurovis_spec.scene.heat import Heat, bands_of
 from neurovis_spec.scene.matrix import MatrixCells, order_of
 from neurovis_spec.scene.model import Film, Group, Text, Theme
 from neurovis_spec.scene.parts import Part
-from neurovis_spec.scene.poses import Poses, posed_of, start_of
+from neurovis_spec.scene.poses import Poses, middles_of, posed_of, start_of
 from neurovis_spec.scene.scales import ScaleLabel, scale_of
 from neurovis_spec.scene.series import chosen, full_name, kind_of, short_names, values_of
 from neurovis_spec.scene.shots import Shots
@@ -166,16 +166,17 @@ class Embodied:
     """The body, from above and from its side."""
 
     picture: body.BodyPicture
+    plot: float = body.PLOT
     timed = False
     sides = (0.0, 0.0)
 
     def heights(self, width: float) -> tuple[float, float]:
         """Titles and numbers, and the drawings."""
-        return self.picture.fixed, body.PLOT
+        return self.picture.fixed, self.plot
 
     def part(self, place: BlockSpace) -> Part:
         """Both drawings."""
-        return self.picture.part(MARGIN, place.width - MARGIN, body.PLOT * place.share, place.theme, place.prefix)
+        return self.picture.part(MARGIN, place.width - MARGIN, self.plot * place.share, place.theme, place.prefix)
 
 
 @dataclass(frozen=True)
@@ -226,7 +227,9 @@ class Maker:
         if posed is None:
             return Note("there is no body to show: the recording holds no poses of one")
         skeleton, values = posed
-        poses = Poses(skeleton, values[self.shots.frames], start_of(skeleton, values[0]))
+        frames = self.shots.frames
+        run = middles_of(skeleton, values), frames
+        poses = Poses(skeleton, values[frames], start_of(skeleton, values[0]), run)
         return Embodied(body.BodyPicture(poses))
 
     def _traces(self, panel: Panel) -> Block:

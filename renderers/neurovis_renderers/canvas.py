@@ -220,6 +220,14 @@ def _highest(order: IntArray, key: IntArray, again: BoolArray, rank: Numbers) ->
     return kept
 
 
+def _in_front(fragments: Fragments, pixels: int) -> IntArray:
+    """Which fragments do not lie behind one that covers all of its pixel: of many that lie behind each other few do."""
+    whole = fragments.shares >= 1
+    front = np.full(pixels, -1, np.int64)
+    np.maximum.at(front, fragments.pixels[whole], fragments.owners[whole])
+    return np.flatnonzero(fragments.owners >= front[fragments.pixels])
+
+
 class Stack:
     """What has been composed of the pixels of a picture: sums of packed colours times weights, and the weight left."""
 
@@ -230,6 +238,8 @@ class Stack:
 
     def add(self, fragments: Fragments, colours: IntArray, front: int) -> None:
         """Put fragments of these colours behind all that is there."""
+        seen = _in_front(fragments, len(self.left))
+        fragments, colours = fragments.only(seen), colours[seen]
         by_pixel = slots(fragments, front)
         left, sums = self.left[by_pixel.pixels], self.sums[by_pixel.pixels]
         for end, which in by_pixel.each():

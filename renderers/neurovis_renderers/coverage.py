@@ -6,6 +6,7 @@ pixel that the shape covers. Shares are computed from where edges run, never by 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import count
@@ -27,6 +28,10 @@ LEAST = 1 / 512
 _SAMPLE = np.float32(0.5 / 3**0.5)
 #: A curve is drawn as straight pieces that deviate from it by at most this many pixels, none longer than ``_PIECE``.
 _DEVIATION, _PIECE, _MOST_PIECES = 0.05, 32.0, 4096
+#: Into so many rows a pixel is cut for what covers it of a polygon.
+_SLICES = 4
+#: Points along the round corners of polygons of two corners, of three, …
+_ROUND = (13, 9, 7, 6, 5, 4, 4, 3)
 #: Two pieces that meet at an angle with a cosine below this form a corner.
 _CORNER = 0.9
 
@@ -415,6 +420,71 @@ def heads(tips: FloatArray, ways: FloatArray, lengths: FloatArray, halves: Float
 
 NO_STROKES = Strokes(_NOWHERE, _NOWHERE, *[_NO_NUMBERS] * 5)
 NO_HEADS = Heads(_NOWHERE, _NOWHERE, _NO_NUMBERS, _NO_NUMBERS)
+
+
+def rounded(corners: FloatArray, margins: FloatArray) -> FloatArray:
+    """Convex polygons of k corners each (n, k, 2) with all that lies within margins (n,) of them, as polygons."""
+    if not margins.any():
+        return corners
+    if corners.shape[1] == 1:
+        corners = np.repeat(corners, 2, axis=1)
+    count = corners.shape[1]
+    edges = np.roll(corners, -1, axis=1) - corners
+    twice = edges[:, :, 0] * np.roll(edges[:, :, 1], -1, axis=1) - edges[:, :, 1] * np.roll(edges[:, :, 0], -1, axis=1)
+    around = np.where(twice.sum(axis=1) < 0, -1.0, 1.0)[:, None]
+    angles = np.arctan2(edges[:, :, 1], edges[:, :, 0])
+    if count == 2:
+        angles[:, 1] = angles[:, 0] + math.pi  # also of a point, which has no edges
+    turns = around * (angles - np.roll(angles, 1, axis=1)) % (2 * math.pi)
+    steps = _ROUND[min(count - 2, len(_ROUND) - 1)]
+    ways = (angles - around * turns)[:, :, None] + (around * turns)[:, :, None] * np.linspace(0, 1, steps)
+    out = np.stack([np.sin(ways), -np.cos(ways)], axis=-1) * around[:, :, None, None]
+    result: FloatArray = corners[:, :, None] + margins[:, None, None, None] * out
+    return result.reshape(len(corners), -1, 2)
+
+
+def polygons(corners: FloatArray, size: Size) -> Fragments:
+    """Filled convex polygons of k corners each (n, k, 2), in order, later ones in front of others: a pixel is cut into
+    ``_SLICES`` rows, of which it is known exactly how much of each lies inside. What is hidden by another of them is
+    left out."""
+    if not len(corners):
+        return NOTHING
+    owners = np.repeat(np.arange(len(corners)), corners.shape[1])
+    starts, ends = corners.reshape(-1, 2), np.roll(corners, -1, axis=1).reshape(-1, 2)
+    first = np.clip(np.floor(corners[:, :, 1].min(axis=1)), 0, size[1]).astype(np.int64)
+    last = np.clip(np.ceil(corners[:, :, 1].max(axis=1)), 0, size[1]).astype(np.int64)
+    rows = np.maximum(last - first, 0)
+    slices = np.concatenate([[0], np.cumsum(_SLICES * rows)])
+    sides = np.zeros((2, slices[-1]), np.float32)  # where each slice begins and ends; nothing of it is within at 0, 0
+    for side, (begin, end) in enumerate(((starts, ends), (ends, starts))):  # edges that lead down, then those up
+        down = end[:, 1] > begin[:, 1]
+        begin, end, owner = begin[down], end[down], owners[down]
+        at = [_SLICES * (edge[:, 1] - first[owner]) - 0.5 for edge in (begin, end)]  # in slices of its polygon
+        low, high = (np.clip(np.ceil(one), 0, _SLICES * rows[owner]).astype(np.int64) for one in at)
+        edge, place = _ranges(np.maximum(high - low, 0))
+        place = place + low[edge]
+        share = (place - at[0][edge]) / (at[1] - at[0])[edge]
+        x = begin[edge, 0] + share * (end[edge, 0] - begin[edge, 0])
+        sides[side, slices[owner[edge]] + place] = x
+    left, right = np.clip(np.sort(sides, axis=0), 0, size[0]).reshape(2, -1, _SLICES)
+    owner = np.repeat(np.arange(len(corners)), rows)
+    begin = (np.arange(len(owner)) - np.repeat(np.cumsum(rows) - rows, rows) + first[owner]) * size[0]
+    low, high = (np.floor(left.min(axis=1)).astype(np.int64), np.ceil(right.max(axis=1)).astype(np.int64))
+    inner, outer = (np.ceil(left.max(axis=1)).astype(np.int64), np.floor(right.min(axis=1)).astype(np.int64))
+    inner, outer = np.minimum(inner, high), np.clip(outer, np.minimum(inner, high), high)
+    row, place = _ranges(outer - inner)
+    front = np.full(size[0] * size[1], -1, np.int64)
+    front[begin[row] + inner[row] + place] = owner[row]  # owners ascend, and the last one stays
+    whole = np.flatnonzero(front >= 0)
+    parts = [Fragments(front[whole], whole, np.ones(len(whole), np.float32))]
+    for start, end in ((low, inner), (outer, high)):
+        row, place = _ranges(np.maximum(end - start, 0))
+        seen = np.flatnonzero(owner[row] > front[begin[row] + start[row] + place])
+        row, x = row[seen], start[row[seen]] + place[seen]
+        within = np.minimum(right[row], (x + 1)[:, None].astype(np.float32))
+        within -= np.maximum(left[row], x[:, None].astype(np.float32))
+        parts.append(_fragments(owner[row], begin[row] + x, np.clip(within, 0, 1).mean(axis=1)))
+    return joined(parts, NOTHING)
 
 
 def rectangle(corner: Point, extent: Point, radius: float, size: Size) -> Fragments:

@@ -30,6 +30,7 @@ from neurovis_spec.scene import (
     Group,
     Image,
     IntArray,
+    Polygon,
     Polyline,
     Ramp,
     Rectangle,
@@ -40,6 +41,7 @@ from neurovis_spec.scene import (
     filled_shape,
     part,
     readable,
+    shifted,
     still,
 )
 
@@ -70,6 +72,8 @@ class Moving:
         self.sheet = Sheet(film.scene.groups, film.scene.density, names)
         places = zip(film.scene.groups, self.sheet.places, strict=True)
         self.apart_places = [where[0] for group, where in places if group.id in names]
+        #: how many of what stands apart are redrawn and come last, so that nothing is in front of them
+        self.last = next((k for k, group in enumerate(reversed(apart)) if group.id not in film.redrawn), len(apart))
         self._find_what_changes(names)
         self.bands = [Band(self, top, size) for top, size in bands(film.scene.pixels)]
 
@@ -161,26 +165,29 @@ def _stands_apart(film: Film, group: Group) -> bool:
     return bool(changes) or group.opacity != 1
 
 
-def _rows(group: Group, density: float) -> tuple[float, float]:
-    """The first and the last row of pixels that a group may touch."""
+def _reach(group: Group, density: float, axis: int) -> tuple[float, float]:
+    """Where shapes begin and end across (0) or down (1), in pixels: from where on and up to where something of them
+    may be seen."""
     lows, highs = [math.inf], [-math.inf]
     for shape in group.shapes:
         match shape:
             case Disc():
-                ys, reach = [shape.centre[1]], shape.radius + shape.stroke_width
+                places, reach = [shape.centre[axis]], shape.radius + shape.stroke_width
             case Spline() | Polyline():
-                ys, reach = [y for _, y in shape.points], shape.width
+                places, reach = [point[axis] for point in shape.points], shape.width
+            case Polygon():
+                places, reach = [point[axis] for point in shape.points], shape.margin
             case Arrowhead():
-                ys, reach = [shape.tip[1]], shape.length + shape.half_width
-            case Text() if not shape.upward:
-                ys, reach = [shape.point[1]], 3 * shape.size
+                places, reach = [shape.tip[axis]], shape.length + shape.half_width
+            case Text() if axis and not shape.upward:
+                places, reach = [shape.point[1]], 3 * shape.size
             case Rectangle() | Ramp() | Image():
-                ys = [shape.corner[1], shape.corner[1] + shape.height]
-                reach = shape.stroke_width if isinstance(shape, Rectangle) else 0.0
+                begin, extent = shape.corner[axis], (shape.width, shape.height)[axis]
+                places, reach = [begin, begin + extent], shape.stroke_width if isinstance(shape, Rectangle) else 0.0
             case _:
                 return -1e9, 1e9
-        lows.append(min(ys) - reach)
-        highs.append(max(ys) + reach)
+        lows.append(min(places) - reach)
+        highs.append(max(places) + reach)
     low, high = min(lows), max(highs)
     return (low * density, high * density) if low <= high else (0.0, 0.0)
 
@@ -314,6 +321,22 @@ def _words(sums: IntArray) -> _Words:
     return result.astype(np.uint32)
 
 
+def _put_on(picture: _Words, fragments: Fragments, colours: IntArray) -> None:
+    """Draw a fragment a pixel, each of its own colour, in front of a picture."""
+    part = fragments.shares < 1
+    picture[fragments.pixels[~part]] = _words(colours[~part] * WHOLE)
+    behind = _lanes_of(picture[fragments.pixels[part]])
+    weights = np.rint(fragments.shares[part] * WHOLE).astype(np.int64)
+    picture[fragments.pixels[part]] = _words(colours[part] * weights + behind * (WHOLE - weights))
+
+
+def _lanes_of(words: _Words) -> IntArray:
+    """Red, green and blue, a byte each, as packed colours."""
+    wide = words.astype(np.int64)
+    result: IntArray = wide & 255 | (wide >> 8 & 255) << LANE | (wide >> 16 & 255) << 2 * LANE
+    return result
+
+
 class Painter:
     """Paints frames of a film, each from what the one that it painted before it has in common with it."""
 
@@ -416,13 +439,17 @@ class _Painted:
         wide, high = self._band.size
         self._apart = [self._drawn(number, group) for number, group in enumerate(groups)]
         picture = self._picture
-        touched = [fragments.pixels for _, fragments, _ in self._apart if len(fragments)]
-        if touched:
+        among = len(groups) - self._moving.last
+        touched = [fragments.pixels for _, fragments, _ in self._apart[:among] if len(fragments)]
+        if groups:
             picture = picture.copy()
+        if touched:
             marked = np.zeros(len(picture), bool)
             marked[np.concatenate(touched)] = True
             pixels = np.flatnonzero(marked)
-            picture[pixels] = _words(self._composed(pixels, colours))
+            picture[pixels] = _words(self._composed(pixels, colours, among))
+        for _, fragments, shades in self._apart[among:]:
+            _put_on(picture, fragments, shades)
         channels = picture.view(np.uint8).reshape(high, wide, 4)
         result = np.empty((high, wide, 3), np.uint8)
         for channel in range(3):  # quicker than all three at once
@@ -433,20 +460,26 @@ class _Painted:
         """A group that stands apart: a fragment for each pixel, and its colours. What has not changed is kept."""
         if number < len(self._apart) and self._apart[number][0] == group:
             return self._apart[number]
-        sheet, band = Sheet((replace(group, opacity=1.0),), self._moving.sheet.density), self._band
-        wide, high = band.size
-        low, above = _rows(group, sheet.density)
-        first, last = (int(np.clip(row - band.top, 0, high)) for row in (low - 2, above + 3))
-        fragments, colours, _ = veiled(sheet, 0, len(sheet), band.top + first, (wide, last - first), group.opacity)
+        band, density = self._band, self._moving.sheet.density
+        low, above = _reach(group, density, 1)
+        first, last = (int(np.clip(row - band.top, 0, band.size[1])) for row in (low - 2, above + 3))
+        low, above = _reach(group, density, 0)
+        left, right = (int(np.clip(column, 0, band.size[0])) for column in (low - 2, above + 3))
+        shapes = tuple(shifted(shape, (-left / density, 0.0)) for shape in group.shapes) if left else group.shapes
+        sheet, wide = Sheet((replace(group, shapes=shapes, opacity=1.0),), density), max(right - left, 1)
+        size = wide, last - first
+        fragments, colours, _ = veiled(sheet, 0, len(sheet), band.top + first, size, group.opacity)
         owners = np.full(len(fragments), self._moving.apart_places[number])
-        return group, Fragments(owners, fragments.pixels + first * wide, fragments.shares), colours
+        row, column = np.divmod(fragments.pixels, wide)
+        pixels = (row + first) * band.size[0] + column + left
+        return group, Fragments(owners, pixels, fragments.shares), colours
 
-    def _composed(self, pixels: IntArray, colours: IntArray) -> IntArray:
-        """The sums of some pixels, with all that stands apart."""
+    def _composed(self, pixels: IntArray, colours: IntArray, among: int) -> IntArray:
+        """The sums of some pixels, with the first so many of what stands apart."""
         band, front = self._band, len(self._moving.sheet)
         stack = Stack(len(pixels))
-        parts = [Fragments(f.owners, np.searchsorted(pixels, f.pixels), f.shares) for _, f, _ in self._apart]
-        paints = [shades for _, _, shades in self._apart]
+        parts = [Fragments(f.owners, np.searchsorted(pixels, f.pixels), f.shares) for _, f, _ in self._apart[:among]]
+        paints = [shades for _, _, shades in self._apart[:among]]
         numbers = band.numbers[pixels]
         places = np.argsort(numbers)
         places = places[np.searchsorted(numbers[places], 0) :]

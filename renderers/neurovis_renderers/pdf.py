@@ -21,6 +21,7 @@ from neurovis_spec.scene import (
     Group,
     Image,
     Point,
+    Polygon,
     Polyline,
     Progress,
     Ramp,
@@ -192,7 +193,10 @@ class _Page:
                 return _painted(way, shape.fill, shape.stroke, shape.stroke_width)
             case Spline() | Polyline():
                 return self._line(shape)
-            case Arrowhead():
+            case Polygon() if shape.margin:
+                way, colours = _straight(shape.points), (_colour(shape.fill, kind) for kind in ("rg", "RG"))
+                return f"q {''.join(colours)}{_number(2 * shape.margin)} w 1 j\n{way}b\nQ\n"
+            case Polygon() | Arrowhead():
                 return f"{_colour(shape.fill, 'rg')}{_straight(shape.points)}h f\n"
             case Ramp():
                 return _ramp(shape)

@@ -27,6 +27,7 @@ from neurovis_spec.scene import (
     Image,
     IntArray,
     Point,
+    Polygon,
     Polyline,
     Ramp,
     Rectangle,
@@ -87,6 +88,8 @@ class Sheet:
         self._splines: list[tuple[int, Spline]] = []
         self._heads: list[tuple[int, Arrowhead]] = []
         self._discs: list[tuple[int, Disc]] = []
+        #: place, corners, margin
+        self._polygons: list[tuple[int, tuple[Point, ...], float]] = []
         #: first place, the place above the last
         self._others: list[tuple[int, int, Shape]] = []
         for group in groups:
@@ -115,6 +118,10 @@ class Sheet:
                 self._splines.append((place, shape))
                 self.colours.append(packed(shape.stroke))
                 return False
+            case Polyline() if shape.round and len(shape.points) == 2 and shape.opacity == 1:
+                self._polygons.append((place, shape.points, shape.width / 2))
+                self.colours.append(packed(shape.stroke))
+                return False
             case Polyline():
                 self._splines.append((place, shape.spline))
                 self.colours.append(packed(shape.stroke))
@@ -125,6 +132,10 @@ class Sheet:
                 return False
             case Arrowhead():
                 self._heads.append((place, shape))
+                self.colours.append(packed(shape.fill))
+                return False
+            case Polygon():
+                self._polygons.append((place, shape.points, shape.margin))
                 self.colours.append(packed(shape.fill))
                 return False
             case Disc():
@@ -163,6 +174,8 @@ class Sheet:
         result[places] = (table[:, 4] + 2 * table[:, 5] + 2) ** 2
         places, table = self._disc_arrays
         result[places] = (2 * table[:, 2] + 2) ** 2
+        places, corners = self._polygon_arrays
+        result[places] = np.prod(np.ptp(corners, axis=1), axis=1)
         for place, _, shape in self._others:
             if isinstance(shape, Rectangle | Ramp | Image):
                 result[place] = shape.width * shape.height * self.density**2
@@ -260,6 +273,21 @@ class Sheet:
         table = np.array(rows, float).reshape(-1, 4) * self.density
         return np.array([place for place, _ in self._discs], np.int64), table
 
+    @cached_property
+    def _polygon_arrays(self) -> tuple[IntArray, FloatArray]:
+        """Places of polygons, and their corners in pixels, (n, k, 2), of those with few the last several times."""
+        rounded = np.zeros((len(self._polygons), 1, 2))
+        counts = np.array([len(corners) for _, corners, _ in self._polygons], np.int64)
+        for count in np.unique(counts).tolist():
+            alike = np.flatnonzero(counts == count)
+            points = np.array([self._polygons[k][1] for k in alike.tolist()]) * self.density
+            margins = np.array([self._polygons[k][2] for k in alike.tolist()]) * self.density
+            made = coverage.rounded(points, margins)
+            more = max(made.shape[1], rounded.shape[1])
+            made, rounded = (np.pad(one, ((0, 0), (0, more - one.shape[1]), (0, 0)), "edge") for one in (made, rounded))
+            rounded[alike] = made
+        return np.array([place for place, _, _ in self._polygons], np.int64), rounded
+
     def heads(self, low: int, high: int, top: int, size: Size) -> Heads:
         """The heads of lines among shapes ``low`` to ``high``, as they lie over rows from ``top`` on."""
         places, table = _between(*self._head_arrays, low, high)
@@ -276,6 +304,8 @@ class Sheet:
         places, centres, radii, widths = places[near], table[near, :2] - (0, top), table[near, 2], table[near, 3]
         found.append(_owned(coverage.discs(centres, radii, size), places))
         found.append(_owned(coverage.rings(centres, radii, widths, size), places + 1))
+        places, corners = _between(*self._polygon_arrays, low, high)
+        found.append(_owned(coverage.polygons(corners - (0, top), size), places))
         for place, end, shape in self._others:
             if place < high and end > low:
                 found += [_owned(part, place + number) for number, part in enumerate(self._other(shape, top, size))]

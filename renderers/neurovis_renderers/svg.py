@@ -28,6 +28,7 @@ from neurovis_spec.scene import (
     Group,
     Image,
     Point,
+    Polygon,
     Polyline,
     Progress,
     Ramp,
@@ -106,6 +107,8 @@ def element(shape: Shape, attributes: str = "", content: str = "") -> str:
             return _close(f"<path{_spline(shape)}{attributes}", "path", content)
         case Polyline():
             return _close(f"<path{_polyline(shape)}{attributes}", "path", content)
+        case Polygon():
+            return _close(f"<polygon{_polygon(shape)}{attributes}", "polygon", content)
         case Arrowhead():
             kind = ' class="bar"' if shape.kind == "bar" and "class=" not in attributes else ""
             return _close(
@@ -140,6 +143,14 @@ def _spline(shape: Spline) -> str:
     opacity = f' stroke-opacity="{num(shape.opacity)}"' if shape.opacity != 1 else ""
     width = exact(shape.width)
     return f'{kind} d="{path(shape.points)}" stroke="{shape.stroke}" stroke-width="{width}"{dash}{opacity}'
+
+
+def _polygon(shape: Polygon) -> str:
+    """Its margin is a stroke of the same colour."""
+    margin = ""
+    if shape.margin:
+        margin = f' stroke="{shape.fill}" stroke-width="{exact(2 * shape.margin)}" stroke-linejoin="round"'
+    return f' points="{pairs(shape.points)}" fill="{shape.fill}"{margin}'
 
 
 def _polyline(shape: Polyline) -> str:

@@ -37,6 +37,9 @@ const FOOT = 1.25,
 /** How much is left of a colour on the far side; what lies so far aside, as a share of the reach, is there or near. */
 const FAR = 0.45,
   ASIDE = 0.12;
+/** The way that the body took: how wide its line is, and how much of its colour is left. */
+const WAY = 2,
+  PALE = 0.55;
 /** A solid as high as the ground is the ground. */
 const FLAT = 1e-6;
 
@@ -65,13 +68,30 @@ function endsOf([start, end, , ...beside]) {
   return [start, end, ...beside];
 }
 
-/** The ends of lines as one way around them; of a single line it is the line. @param {number[]} ends
- * @returns {number[]} */
-function around(ends) {
-  if (ends.length === 2) return ends;
-  const starts = ends.filter((_, at) => at % 2 === 0),
-    others = ends.filter((_, at) => at % 2 === 1);
-  return [...starts, ...others.reverse(), starts[0]];
+/** The corners of the convex hull of points on the page, in order. @param {[number, number][]} points
+ * @returns {[number, number][]} */
+function outline(points) {
+  const sorted = [...points].sort(([x, y], [u, v]) => x - u || y - v);
+  /** @param {[number, number][]} some */
+  const chain = (some) => {
+    /** @type {[number, number][]} */
+    const found = [];
+    for (const [x, y] of some) {
+      while (found.length > 1) {
+        const [[u, v], [s, t]] = found.slice(-2);
+        if ((s - u) * (y - v) - (t - v) * (x - u) > 0) break;
+        found.pop();
+      }
+      found.push([x, y]);
+    }
+    return found.slice(0, -1);
+  };
+  return points.length < 3 ? points : [...chain(sorted), ...chain(sorted.reverse())];
+}
+
+/** How far apart two points are. @param {number[]} one @param {number[]} other @returns {number} */
+function distance(one, other) {
+  return Math.hypot(...one.map((value, at) => value - other[at]));
 }
 
 /** The panel of the body. */
@@ -90,6 +110,8 @@ export class Body {
     this.reach = { ahead: LEAST, aside: LEAST, low: 0, high: LEAST };
     /** how high each link reaches in the first pose; none before it @type {number[]} */
     this.tops = [];
+    /** where the middle was at the steps that were shown, up to the one that is @type {[number, number, number][]} */
+    this.way = [];
     this.open = true;
     /** what is drawn: nothing else needs to be */
     this.drawn = '';
@@ -105,6 +127,7 @@ export class Body {
     this.start = start;
     this.reach = { ahead: LEAST, aside: LEAST, low: 0, high: LEAST };
     this.tops = [];
+    this.way = [];
     this.words = '';
     this.arrange();
   }
@@ -137,6 +160,7 @@ export class Body {
   /** Draw the pose of a look, where it is another one. @param {Look} look @param {Scene} scene */
   show(look, scene) {
     const { skeleton, canvas } = this;
+    this.follow(look);
     if (!skeleton || this.panel.hidden) return;
     const { clientWidth: wide, clientHeight: high } = canvas,
       wanted = [look.step, look.serial, wide, high, devicePixelRatio, scene.version].join(' ');
@@ -165,6 +189,7 @@ export class Body {
       context.save();
       this.ground(context, frame, scene.theme);
       if (points) {
+        if (frame.up === 1) this.trail(context, frame, scene.theme);
         this.links(context, frame, scene.theme, points);
         this.feet(context, frame, scene.theme, points, touching);
       }
@@ -172,6 +197,25 @@ export class Body {
       this.numbers(context, frame, scene.theme);
       this.title(context, frame, scene.theme, points);
     }
+  }
+
+  /** Note where the middle is: of a way that goes on; where it is elsewhere at once, or not known, another begins.
+   * @param {Look} look */
+  follow(look) {
+    const { skeleton, reach } = this,
+      middle = this.points(look.pose)?.[skeleton?.middle ?? 0];
+    while (this.way.length && this.way[this.way.length - 1][0] >= look.step) this.way.pop();
+    const last = this.way[this.way.length - 1];
+    if (!middle || (last && distance(last.slice(1), middle.slice(0, 2)) > 2 * reach.ahead)) this.way = [];
+    if (middle) this.way.push([look.step, middle[0], middle[1]]);
+  }
+
+  /** The way so far, on the ground. @param {CanvasRenderingContext2D} context @param {Frame} frame @param {Theme} theme */
+  trail(context, frame, theme) {
+    context.beginPath();
+    for (const [, x, y] of this.way) context.lineTo(...this.spot(frame, [x, y, 0]));
+    [context.strokeStyle, context.lineWidth] = [mixed(theme.positive, theme.box_fill, PALE), WAY];
+    context.stroke();
   }
 
   /** Which feet touch something. @param {Look} look @returns {boolean[]} */
@@ -300,26 +344,30 @@ export class Body {
   /** Links, the nearest last. @param {CanvasRenderingContext2D} context @param {Frame} frame @param {Theme} theme
    * @param {number[][]} points */
   links(context, frame, theme, points) {
-    const links = this.skeleton?.links ?? [],
-      thickest = Math.max(1e-300, ...links.map(([, , radius]) => radius));
-    const ordered = links.map((link, at) => {
+    const links = (this.skeleton?.links ?? []).map((link) => {
       const ends = endsOf(link),
-        radius = link[2],
-        layer = this.layer(points, ends);
-      return { ends, radius, order: frame.up === 1 ? this.tops[at] : layer || (0.5 * radius) / thickest };
+        far = ends.length > 2 ? Math.max(...ends.map((end) => distance(points[end], points[ends[0]]))) : 0;
+      return { ends, radius: link[2], size: link[2] + far / 2 };
+    });
+    const largest = Math.max(1e-300, ...links.map(({ size }) => size));
+    const ordered = links.map((link, at) => {
+      const layer = this.layer(points, link.ends);
+      return { ...link, order: frame.up === 1 ? this.tops[at] : layer || (0.5 * link.size) / largest };
     });
     ordered.sort((one, other) => one.order - other.order);
     for (const { ends, radius, order } of ordered) {
-      const width = Math.max(2 * radius * frame.scale, THIN),
+      const corners = outline(ends.map((end) => this.spot(frame, points[end]))),
+        width = Math.max(2 * radius * frame.scale, ends.length > 2 ? 0 : THIN),
         isFar = frame.up === 2 && order < 0;
       context.beginPath();
-      for (const one of around(ends)) context.lineTo(...this.spot(frame, points[one]));
+      for (const corner of corners) context.lineTo(...corner);
+      if (ends.length > 2) context.closePath();
       [context.strokeStyle, context.lineWidth] = [theme.box_fill, width + 2 * CASING];
       context.stroke();
       context.fillStyle = isFar ? mixed(theme.zero, theme.box_fill, FAR) : theme.zero;
       [context.strokeStyle, context.lineWidth] = [context.fillStyle, width];
       context.fill();
-      context.stroke();
+      if (width > 0) context.stroke();
     }
   }
 

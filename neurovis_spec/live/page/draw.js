@@ -477,6 +477,18 @@ export class Drawing {
         context.stroke(spline(shape.points));
         context.restore();
         break;
+      case 'polygon':
+        context.beginPath();
+        for (let at = 0; at < shape.points.length; at += 2) context.lineTo(shape.points[at], shape.points[at + 1]);
+        context.closePath();
+        context.fillStyle = context.strokeStyle = shape.fill;
+        context.fill();
+        if (shape.width > 0) {
+          context.lineJoin = 'round';
+          context.lineWidth = shape.width;
+          context.stroke();
+        }
+        break;
       case 'head':
         this.head(context, shape, shape.width || 0.6, shape.fill, shape.end);
         break;
