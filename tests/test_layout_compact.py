@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
+import numpy as np
 import pytest
 from neurovis_layouts.layered import component_layout, hierarchy
 from neurovis_layouts.layered.compact import RANKS, WHOLE, Shape
@@ -13,7 +14,8 @@ from neurovis_layouts.layered.page_cost import PageCost
 from neurovis_layouts.layered.templates import Book
 
 import neurovis_spec as nv
-from neurovis_spec.layout.model import Effort, LayoutProblem
+from neurovis_spec.layout.geometry import near_pairs
+from neurovis_spec.layout.model import RADIUS, Effort, Layout, LayoutProblem
 from neurovis_spec.layout.problem import problem_of
 
 #: Sixteen instances that are declared together, with two links each: in one row they are five times as wide as high.
@@ -130,3 +132,62 @@ def test_a_page_costs_its_size_its_proportions_and_what_is_hard_to_follow_on_it(
     free, through = PageCost(problem, [(0, 2)], False), [(0.0, 0.0), (12.0, 0.0), (0.0, 9.0), (0.0, 4.0)]
     assert free(square, page) < free(through, page)
     assert plain([(12.0 - x, y) for x, y in square], page) == plain(square, page)
+
+
+def _long(layout: Layout) -> float:
+    """How many times as wide as high it is, or as high as wide."""
+    wide, high = (np.ptp([point[axis] for point in layout.positions.values()]) + 1 for axis in (0, 1))
+    return float(max(wide / high, high / wide))
+
+
+def _compiled(lines: str) -> Layout:
+    return nv.compile_text(f"neurovis: 1\nname: large\n{lines}\n").layout().value
+
+
+def test_a_chain_of_many_instances_stands_in_as_many_bands_as_it_takes() -> None:
+    module = "modules: {m: {neurons: {A: {}, B: {}}, connections: {A -> B: 1}}}"
+    links = ", ".join(f"m{i}.B -> m{i + 1}.A: 1" for i in range(1, 80))
+    assert _long(_compiled(f"{module}\ninstances: {{m: {{module: m, count: 80}}}}\nconnections: {{{links}}}")) < 2
+
+
+def test_instances_of_one_module_that_are_declared_one_by_one_stand_in_rows() -> None:
+    parts = ["modules:", "  l0: {neurons: {A: {}, B: {}}, connections: {A -> B: 1}}"]
+    for level in range(1, 7):
+        own = f"instances: {{x: {{module: l{level - 1}}}, y: {{module: l{level - 1}}}}}"
+        parts.append(f"  l{level}: {{neurons: {{A: {{}}}}, {own}, connections: {{A -> x.A: 1, A -> y.A: 1}}}}")
+    assert _long(_compiled("\n".join([*parts, "instances: {r: {module: l6}}"]))) < 2.5  # 5.7 side by side
+
+
+def _levels(count: int, size: int, back: bool) -> str:
+    groups = ", ".join(f"G{i}_: {{count: {size}, box: level {i}}}" for i in range(count))
+    drawn = "{weight: 1, pattern: {random: {probability: 0.12}}}"
+    links = [f"G{i}_ -> G{i + 1}_: {drawn}" for i in range(count - 1)]
+    links += [f"G{i + 1}_ -> G{i}_: {drawn}" for i in range(count - 1)] if back else []
+    return f"neurons: {{{groups}}}\nconnections: {{{', '.join(links)}}}"
+
+
+@pytest.mark.parametrize(("back", "engine"), [(False, "layered"), (True, "organic")])
+def test_many_levels_stand_in_bands_or_go_to_and_fro(back: bool, engine: str) -> None:
+    layout = _compiled(_levels(*((40, 6) if not back else (22, 14)), back))
+    assert layout.engine == engine
+    assert _long(layout) < 2.5
+
+
+def test_a_network_of_few_neurons_is_as_long_as_it_is() -> None:
+    names = ", ".join(f"N{i}_: {{}}" for i in range(60))
+    links = ", ".join(f"N{i}_ -> N{i + 1}_: 1" for i in range(59))
+    assert _long(_compiled(f"neurons: {{{names}}}\nconnections: {{{links}}}")) > 60
+
+
+@pytest.mark.parametrize(("sizes", "wide"), [((64, 32, 10), 40), ((784, 16, 10), 80)])
+def test_layers_are_neither_flat_nor_endless(sizes: tuple[int, ...], wide: float) -> None:
+    groups = ", ".join(f"L{'XHY'[i]}: {{count: {size}}}" for i, size in enumerate(sizes))
+    drawn = "{weight: 1, pattern: {random: {probability: 0.05}}}"
+    links = ", ".join(f"L{a} -> L{b}: {drawn}" for a, b in ("XH", "HY"))
+    layout = _compiled(f"neurons: {{{groups}}}\nconnections: {{{links}}}")
+    assert _long(layout) < 2.6
+    assert np.ptp([x for x, _ in layout.positions.values()]) < wide
+    places = np.array(list(layout.positions.values()))
+    assert near_pairs(places, 2 * RADIUS)[0].size == 0
+    depth = {own: [y for name, (_, y) in layout.positions.items() if name[1] == own] for own in "XHY"}
+    assert max(depth["X"]) < min(depth["H"]) <= max(depth["H"]) < min(depth["Y"])

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from operator import itemgetter
+from operator import attrgetter
 from typing import TypeAlias
 
 from neurovis_layouts.layered.drawing import Drawing
@@ -31,8 +31,12 @@ _WORTH = (0.95, 0.75)
 _EACH = 0.96
 #: So many numbers of bands one after the other are tried in vain.
 _IN_VAIN = 2
-#: In no more bands or rows than this, nor more neurons and connections.
-_MOST_FOLDS, _MOST = 8, 3000
+#: So many numbers of bands or rows are tried one by one, further ones in steps of a fifth, up to so many; and what has
+#: more neurons and connections than the last is not folded.
+_ONE_BY_ONE, _STEP, _MOST_FOLDS, _MOST = 8, 5, 40, 3000
+#: Nothing is longer than the page by this if it can be folded, whatever that costs; without instances only what has
+#: more neurons than this, as lines that run back are worth more in a smaller picture.
+_LONGEST, _MANY = 2.5, 200
 
 
 #: What can be folded: the ranks of a kind of instance, or of the whole (its number, RANKS), or the rows of instances of
@@ -74,51 +78,88 @@ Drawn: TypeAlias = Callable[[LayoutProblem, Shape], Drawing]
 
 def may_be_folded(problem: LayoutProblem) -> bool:
     """Whether nothing says where on the page something stands, and it is not too large to try. Without instances only a
-    page that is asked for is worth that signals run back."""
+    page that is asked for is worth that signals run back, or a network of many neurons."""
     fixed = problem.plan or problem.pins or any(module.pins for module in problem.modules)
-    asked = problem.modules or problem.aspect is not None
+    asked = problem.modules or problem.aspect is not None or many(problem)
     return bool(asked) and not fixed and len(problem.neurons) + len(problem.edges) <= _MOST
 
 
+def many(problem: LayoutProblem) -> bool:
+    """Whether it has so many neurons that all of them can be seen on a page only where nothing of it is left empty."""
+    return len(problem.neurons) > _MANY
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """A shape, what it costs, and how many times as long as the page it is."""
+
+    cost: float
+    long: float
+    shape: Shape
+
+
 def compact(problem: LayoutProblem, drawn: Drawn, folds: Mapping[Fold, range]) -> Shape:
-    """The shape that costs least. ``folds`` says, once it has been drawn, what can be folded, and into how many bands
-    or rows. The one may leave no room for the other: bands are tried first, and rows."""
-    shape = Shape(draft=True)
-    drawing = drawn(problem, shape)
+    """The shape that costs least, or, of what would be too long so, least of those that are not. ``folds`` says, once
+    it has been drawn, what can be folded, and into how many bands or rows. The one may leave no room for the other:
+    bands are tried first, and rows."""
+    drawing = drawn(problem, Shape(draft=True))
     size = sides(drawing.rect(), problem.direction)
     free = int(problem.aspect is None or not problem.modules)
-    if stretched(problem, *size) < _STRETCHED[free] or max(size) < _SHORT[free]:
+    worth = problem.modules or problem.aspect is not None
+    short = stretched(problem, *size) < _STRETCHED[free] or not worth
+    if (short and not (free and _long(problem, drawing) > _LONGEST)) or max(size) < _SHORT[free]:
         return Shape()
-    page_cost = PageCost(problem, [(edge.source, edge.target) for edge in problem.edges], directed=True)
+    cost = PageCost(problem, [(edge.source, edge.target) for edge in problem.edges], directed=True)
+    every: list[_Tried] = []
 
-    def cost(drawing: Drawing) -> float:
-        return page_cost(drawing.places, drawing.rect())
+    def tried(shape: Shape, drawing: Drawing) -> _Tried:
+        every.append(_Tried(cost(drawing.places, drawing.rect()), _long(problem, drawing), shape))
+        return every[-1]
 
-    first = cost(drawing)
-    tried: list[tuple[float, Shape]] = []
+    first = tried(Shape(draft=True), drawing)
+    best: list[_Tried] = []
     for rows_first in (False, True):
-        found = first, shape
+        found = first
         for fold in sorted(folds, key=lambda fold: ((fold[1] == RANKS) == rows_first, fold)):
-            found = _folded(lambda shape: cost(drawn(problem, shape)), fold, folds[fold], *found)
-        tried.append(found)
-    least, shape = min(tried, key=itemgetter(0))
-    return replace(shape, draft=False) if least < _WORTH[free] * first else Shape()
+            found = _folded(lambda shape: tried(shape, drawn(problem, shape)), fold, folds[fold], found)
+        best.append(found)
+    least = min(best, key=attrgetter("cost"))
+    chosen = least if worth and least.cost < _WORTH[free] * first.cost else first
+    if free and chosen.long > _LONGEST:
+        chosen = min(every, key=lambda one: (max(one.long, _LONGEST), one.cost))
+    return replace(chosen.shape, draft=False) if chosen is not first else Shape()
 
 
-def _folded(
-    cost: Callable[[Shape], float], fold: Fold, counts: range, least: float, shape: Shape
-) -> tuple[float, Shape]:
-    """The least cost, and the shape that has it, with any of these numbers of bands or rows of one kind; once more have
-    been no better for some times, even more are not tried."""
-    best, found, vain = least, shape, 0
-    for count in counts:
-        if count > _MOST_FOLDS:
-            break
-        other = shape.changed(fold, count)
-        now = cost(other)
+def _folded(tried: Callable[[Shape], _Tried], fold: Fold, counts: range, found: _Tried) -> _Tried:
+    """What costs least with any of these numbers of bands or rows of one kind; once more have been no better for some
+    times, even more are not tried."""
+    best, vain, base = found, 0, found.shape
+    for count in _steps(counts):
+        now = tried(base.changed(fold, count))
         vain += 1
-        if now < _EACH * best:
-            best, found, vain = now, other, 0
+        if now.cost < _EACH * best.cost:
+            best, vain = now, 0
         if vain == _IN_VAIN:
             break
-    return best, found
+    return best
+
+
+def _steps(counts: range) -> list[int]:
+    """The numbers that are tried of these.
+
+    >>> _steps(range(2, 20))
+    [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 19]
+    """
+    found = [count for count in counts if count <= _ONE_BY_ONE]
+    count = max(_ONE_BY_ONE + 1, counts.start)
+    while count < min(counts.stop, _MOST_FOLDS + 1):
+        found.append(count)
+        count += max(1, count // _STEP)
+    return found
+
+
+def _long(problem: LayoutProblem, drawing: Drawing) -> float:
+    """How many times as wide as high a drawing is, or as high as wide; where a page is asked for, for its sides."""
+    wide, high = sides(drawing.rect(), problem.direction)
+    page = 1.0 if problem.aspect is None else problem.aspect
+    return max(wide / (page * high), page * high / wide)

@@ -24,7 +24,7 @@ from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.mirror import mirrored
 from neurovis_layouts.layered.order import Order, crossings, ordered
 from neurovis_layouts.layered.parts import symmetric
-from neurovis_layouts.layered.place import placed, reaches, staggered
+from neurovis_layouts.layered.place import flattened, placed, reaches, staggered
 from neurovis_layouts.layered.ranks import INSTANT, levelled, ranks_of
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint
@@ -36,6 +36,8 @@ from neurovis_spec.layout.model import LayoutProblem, Point, Side
 _ENTERED = (0.25, 0.0, -0.25)
 #: How many segments are crossed in a rank on the way into a frame.
 _PASSED = 0.125
+#: So often the ranks of layers are put farther apart at most.
+_ROUNDS = 3
 #: That a row stands behind another outweighs any connection.
 _ROW = 1000 * INSTANT
 
@@ -262,10 +264,10 @@ def with_labels_at_ends(found: Component) -> Component:
     return replace(found, levels=replace(levels, nodes=nodes), layout=replace(found.layout, sides=sides))
 
 
-def with_places(found: Component) -> Component:
-    """Places across and along."""
+def with_places(found: Component, rank_spacing: float | None = None) -> Component:
+    """Places across and along, ranks as far apart as the problem says, or otherwise."""
     problem, ranks = found.part.problem, stacked(found.levels, found.folds)
-    spacing = problem.neuron_spacing, problem.rank_spacing
+    spacing = problem.neuron_spacing, problem.rank_spacing if rank_spacing is None else rank_spacing
     return replace(found, places=placed(ranks, found.order, *spacing, found.partner, found.columns, found.folds.ranks))
 
 
@@ -276,6 +278,16 @@ def with_staggered_ranks(found: Component) -> Component:
         return found
     uneven = frozenset(r for r, rank in enumerate(found.order) if any(levels.nodes[n].lift for n in rank))
     return with_places(replace(found, levels=levels, uneven=uneven))
+
+
+def with_layers_apart(found: Component) -> Component:
+    """Layers that are so wide that they would be flat farther apart; their rows are as high as they are."""
+    problem, spacing = found.part.problem, found.part.problem.rank_spacing
+    for _ in range(_ROUNDS):
+        spacing *= flattened(problem, found.levels, found.places)
+        if spacing > problem.rank_spacing:
+            found = with_places(found, spacing)
+    return found
 
 
 def with_guests_drawn_in(found: Component) -> Component:

@@ -47,6 +47,7 @@ PLACES: Phases[Component] = (
     (components.with_labels_at_ends, _always),
     (components.with_places, _always),
     (components.with_staggered_ranks, lambda found: not (found.partner or found.columns)),
+    (components.with_layers_apart, lambda found: found.uneven),
     (components.with_guests_drawn_in, lambda found: found.part.guests),
     (components.with_neurons, _always),
     (components.with_waypoints, _always),

@@ -15,8 +15,8 @@ from typing import Protocol, TypeAlias
 from neurovis_layouts.alike import Move
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.label_room import roomy, sides_of
-from neurovis_layouts.layered.bands import FEW, Wanted
-from neurovis_layouts.layered.compact import RANKS, Fold, Shape
+from neurovis_layouts.layered.bands import FEW, MANY_LINES, Wanted
+from neurovis_layouts.layered.compact import RANKS, Fold, Shape, many
 from neurovis_layouts.layered.component_layout import ComponentLayout, RankProblem
 from neurovis_layouts.layered.components import planned
 from neurovis_layouts.layered.drawing import Piece, brought
@@ -116,18 +116,30 @@ def with_rows(frame: Frame) -> Frame:
     held = {piece.part.kind for piece in frame.pieces if lines.intersection(piece.part.members)}
     rows: list[list[int]] = []
     behind: list[tuple[int, int]] = []
-    for key, family in families.items():
-        make, apart = key[1], chains.get(key, False)
+    alike = {} if frame.pair else _alike(families)
+    for key, family in (*families.items(), *alike.items()):
+        make, apart = key[1], key in alike or chains.get(key, False)
         if make not in held:
             tries = frame.folds.get((frame.kind, make), range(2, 2))
-            frame.folds[frame.kind, make] = range(1 if apart else tries.start, max(len(family) + 1, tries.stop))
+            first = 1 if apart and key not in alike else tries.start
+            frame.folds[frame.kind, make] = range(first, max(len(family) + 1, tries.stop))
         count = frame.shape.rows(frame.kind, make)
-        # mirrored chains are columns that face each other, unless rows are asked for: each finds a rank of its own
+        # mirrored chains are columns that face each other, unless rows are asked for: each finds a rank of its own; and
+        # so does what is not declared together
         if count is not None or not apart:
             own = in_rows(family, count or 1)
             behind += [(before[0], after[0]) for before, after in pairwise(own)]
             rows += own
     return replace(frame, rows=rows, behind=behind)
+
+
+def _alike(families: Mapping[tuple[str, int], Sequence[int]]) -> dict[tuple[str, int], list[int]]:
+    """Those that are declared each by itself, of one kind together, where there are several."""
+    found: dict[tuple[str, int], list[int]] = {}
+    for (_, make), family in families.items():
+        if len(family) == 1:
+            found.setdefault(("", make), []).extend(family)
+    return {key: family for key, family in found.items() if len(family) > 1}
 
 
 def _chains(frame: Frame, families: Mapping[tuple[str, int], Sequence[int]]) -> Mapping[tuple[str, int], bool]:
@@ -149,7 +161,8 @@ def with_components(frame: Frame, laid_out: LayOut) -> Frame:
     problem, units, shape = frame.problem, frame.units, frame.shape
     # a ring or a line of which a box holds some alone can be in no strip of its own
     columns = {box for box in frame.columns if _whole(units, problem.boxes[box][1])}
-    wanted = Wanted(shape.bands(frame.kind), FEW if frame.kind >= 0 or problem.modules else 1)
+    few = FEW if frame.kind >= 0 or problem.modules else MANY_LINES if many(problem) else 1
+    wanted = Wanted(shape.bands(frame.kind), few)
     ranks = RankProblem(
         problem,
         units,

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from neurovis_layouts.alike import mirror_images, shifted_by
 from neurovis_layouts.frame import from_picture
-from neurovis_layouts.layered.compact import NONE, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
+from neurovis_layouts.layered.compact import NONE, RANKS, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
 from neurovis_layouts.layered.drawing import Drawing, Piece, piece_of
 from neurovis_layouts.layered.engine import stands
 from neurovis_layouts.layered.frame_layout import Frame
@@ -80,6 +80,8 @@ class Composer:
         #: whether anything can be folded; what, and into how many bands or rows
         self._folding = False
         self._folds: dict[Fold, range] = {}
+        #: how the whole looks in a shape, and into how many bands it can be folded then
+        self._drafts: dict[frozenset[tuple[Fold, int]], tuple[Drawing, range]] = {}
 
     def whole(self, routed: bool = True) -> Drawing:
         """The drawing of the problem; without ``routed`` that of its neurons and frames alone, which stand where they
@@ -92,9 +94,13 @@ class Composer:
         return self.compose(problem, routed)
 
     def _in_shape(self, problem: LayoutProblem, shape: Shape) -> Drawing:
-        """The drawing of the whole in a shape."""
-        self._shape = shape
-        return self.compose(problem)
+        """The drawing of the whole in a shape; the same shape is tried in several orders of folds."""
+        key = frozenset(shape.counts.items())
+        if key not in self._drafts:
+            self._shape = shape
+            self._drafts[key] = self.compose(problem), self._folds[WHOLE, RANKS]
+        drawing, self._folds[WHOLE, RANKS] = self._drafts[key]
+        return drawing
 
     def check_mirrors(self) -> None:
         """Raises LayoutRefusalError where an arrangement cannot be symmetric, in the problem or in a kind of instance,

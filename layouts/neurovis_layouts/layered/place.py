@@ -4,12 +4,14 @@ In: Levels and the order. Out: x and y of every node. Across, each rank is moved
 nodes are connected to, in sweeps; within a rank that is an isotonic regression, so that what is symmetric stays
 symmetric. Along, ranks are as far apart as asked, farther where blocks are high or the ranks so wide that lines would
 run flat over discs. Ranks that make a drawing much wider than a page are staggered: every other neuron stands a step
-behind its neighbours, and connections run in the gaps between those before (``folds``).
+behind its neighbours, and connections run in the gaps between those before (``folds``); of very many neurons in more
+rows than two, and the ranks of layers so wide are farther apart.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
@@ -40,6 +42,10 @@ _FLAT, _FANNED = 14.0, 5.0
 _HARDLY = 1e-7
 #: What is wider than a page by this is staggered: its ranks of so many neurons and more, that make it so wide.
 _WIDE, _FEWEST, _PART = 2.0, 20, 0.5
+#: A layer of so many neurons that two rows would be longer than this, in spacings, stands in more.
+_LONGEST_ROW = 75.0
+#: What is wider than so many times its height after that has its ranks farther apart.
+_WIDEST = 2.4
 
 
 def placed(
@@ -75,7 +81,10 @@ def placed(
 
 def _gaps(levels: Levels, order: Sequence[Sequence[int]], spacing: float) -> list[list[float]]:
     """Least distances between neighbours; a rank much narrower than its neighbours is stretched."""
-    plain = [[_gap(levels, a, b, spacing) for a, b in pairwise(rank)] for rank in order]
+    rows = [len({levels.nodes[n].lift for n in rank if _alone(levels.nodes[n])}) for rank in order]
+    plain = [
+        [_gap(levels, a, b, spacing, own) for a, b in pairwise(rank)] for rank, own in zip(order, rows, strict=True)
+    ]
     widths = [math.fsum(gaps) + _ends(levels, rank) for gaps, rank in zip(plain, order, strict=True)]
     result: list[list[float]] = []
     for r, gaps in enumerate(plain):
@@ -89,22 +98,25 @@ def _ends(levels: Levels, rank: Sequence[int]) -> float:
     return levels.nodes[rank[0]].reach[0] + levels.nodes[rank[-1]].reach[0] if rank else 0.0
 
 
-def _gap(levels: Levels, a: int, b: int, spacing: float) -> float:
+def _gap(levels: Levels, a: int, b: int, spacing: float, rows: int) -> float:
+    """The least distance of two neighbours of a rank whose single neurons stand in so many ``rows``."""
     first, second = levels.nodes[a], levels.nodes[b]
     between = first.reach[0] + second.reach[0]
     if not first.members and not second.members:
         return _BESIDE_PASSAGE
     if not first.members or not second.members:
         return between + _BESIDE_DISC
-    if _apart(first, second) and between == 0:
-        return _STAGGERED * spacing
+    if _apart(first, second, rows) and between == 0:
+        return 2 * _STAGGERED / max(rows, 2) * spacing
     if (_rigid(first) or _rigid(second)) and not (first.framed and second.framed):
         between += 0.5 * spacing
     return between + spacing + (_BETWEEN_BOXES if first.box != second.box else 0.0)
 
 
-def _apart(first: Node, second: Node) -> bool:
-    """Whether two single neurons of a rank stand on different sides of its line."""
+def _apart(first: Node, second: Node, rows: int) -> bool:
+    """Whether two single neurons of a rank stand on different sides of its line, or in different ones of many rows."""
+    if rows > 2 and _alone(first) and _alone(second):
+        return first.lift != second.lift
     return len(first.members) == len(second.members) == 1 and first.lift * second.lift < 0
 
 
@@ -219,17 +231,36 @@ def staggered(
     if wide < _WIDE * page * high:
         return None
     lined = {m for line in problem.align for m in line}
-    nodes, rise = list(levels.nodes), snap(problem.neuron_spacing / 2)
+    group = {m: number for number, own in enumerate(problem.groups) for m in own.members}
+    nodes = list(levels.nodes)
     for rank in order:
         own = [n for n in rank if nodes[n].members]
         across = [places[n][0] for n in own]
-        alone = all(_alone(nodes[n], lined) for n in own)
+        alone = all(_alone(nodes[n]) and not nodes[n].lift and nodes[n].members[0][0] not in lined for n in own)
         if alone and len(own) >= _FEWEST and max(across) - min(across) > _PART * wide:
+            layer = len({group.get(nodes[n].members[0][0]) for n in own}) == 1
+            rows = max(2, math.ceil(2 * _STAGGERED * len(own) / _LONGEST_ROW)) if layer else 2
             for place, n in enumerate(own):
-                nodes[n] = replace(nodes[n], lift=rise if place % 2 else -rise)
+                nodes[n] = replace(nodes[n], lift=snap(((rows - 1) / 2 - (place + 1) % rows) * problem.neuron_spacing))
     return None if nodes == levels.nodes else replace(levels, nodes=nodes)
 
 
-def _alone(node: Node, lined: AbstractSet[int]) -> bool:
-    """Whether a node is a single neuron, as high as its disc, that nobody wants on a line."""
-    return len(node.members) == 1 and node.reach == (0.0, 0.0) and not node.lift and node.members[0][0] not in lined
+def flattened(problem: LayoutProblem, levels: Levels, places: Sequence[Point]) -> float:
+    """How many times farther apart staggered ranks have to be, if one of them is a whole layer of neurons, so that the
+    drawing is not too wide; 1 at least. Lines between layers are easier to follow so."""
+    xs, ys = zip(*places, strict=True)
+    wide, high = max(xs) - min(xs) + 1, max(ys) - min(ys) + 1
+    page = 1.0 if problem.aspect is None else problem.aspect
+    group = {m: number for number, own in enumerate(problem.groups) for m in own.members}
+    layers = Counter((node.rank, group.get(m, -1)) for node in levels.nodes if node.lift for m, _, _ in node.members)
+    layer = any(own >= 0 and count >= _FEWEST for (_, own), count in layers.items())
+    return (
+        max(1.0, wide / (_WIDEST * (page if problem.direction in ("down", "up") else 1 / page) * high))
+        if layer
+        else 1.0
+    )
+
+
+def _alone(node: Node) -> bool:
+    """Whether a node is a single neuron, as high as its disc."""
+    return len(node.members) == 1 and node.reach == (0.0, 0.0)

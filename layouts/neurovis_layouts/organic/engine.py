@@ -18,6 +18,7 @@ from neurovis_layouts.finish import alone, drawn, drawn_apart, nearest
 from neurovis_layouts.organic.field import Cooling, GridField, Held, settle
 from neurovis_layouts.organic.flow import in_flow
 from neurovis_layouts.organic.levels import COARSEST, SPARSE, spread, spread_small
+from neurovis_layouts.organic.rows import in_rows
 from neurovis_layouts.organic.trees import trees_of
 from neurovis_layouts.packing import packed
 from neurovis_layouts.symmetry import Symmetry, about_pins, first_of_pairs, symmetry_of
@@ -64,9 +65,11 @@ class OrganicEngine:
         places, planar = _free(problem, wiring, progress)
         if problem.pins:
             symmetry, places = _around_pins(problem, wiring, symmetry, places)
-        if problem.pins or problem.boxes or symmetry.paired.any() or any(wide for wide, _ in problem.labels):
-            real = places[: len(problem.neurons)]
-            return drawn_apart(problem, self.name, real, _APART * problem.neuron_spacing, symmetry)
+        real = places[: len(problem.neurons)]
+        rows = in_rows(problem, real)
+        framed = problem.pins or problem.boxes or symmetry.paired.any() or any(wide for wide, _ in problem.labels)
+        if framed or rows is not real:
+            return drawn_apart(problem, self.name, rows, _APART * problem.neuron_spacing, symmetry)
         clear = [i for i, edge in enumerate(problem.edges) if planar[edge.source] and edge.source != edge.target]
         return drawn(problem, self.name, places, alone(problem, clear))
 
