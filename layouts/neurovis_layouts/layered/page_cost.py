@@ -50,7 +50,8 @@ class PageCost:
         lines = centres[self._lines]
         length = math.fsum(lengths(lines[:, 1] - lines[:, 0]).tolist())
         met = min(_CROSSING * _crossings(lines, *self._apart), _CROSSED * length)
-        met += _BACK * _back(lines) if self._directed else _CROSSING * _run_over(lines, centres)
+        back = int((lines[:, 0, 1] > lines[:, 1, 1]).sum())
+        met += _BACK * back if self._directed else _CROSSING * _run_over(lines, centres)
         page = math.sqrt(stretched(self._problem, wide, high)) if max(wide, high) > _SMALL else 1.0
         return (_SIDE * math.sqrt(wide * high) + length + met) * page
 
@@ -77,11 +78,6 @@ def _crossings(lines: FloatArray, one: IntArray, other: IntArray) -> int:
     """How many of these pairs of straight lines (n, 2, 2) cross."""
     (a, b), (c, d) = lines[one].transpose(1, 2, 0), lines[other].transpose(1, 2, 0)
     return int(crossing(a, b - a, c, d - c)[1].sum())
-
-
-def _back(lines: FloatArray) -> int:
-    """How many of these straight lines (n, 2, 2) run against the direction."""
-    return int((lines[:, 0, 1] > lines[:, 1, 1]).sum())
 
 
 def _run_over(lines: FloatArray, places: FloatArray) -> int:

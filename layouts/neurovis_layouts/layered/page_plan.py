@@ -8,9 +8,10 @@ cell names is placed behind the cell that it has most connections with. Mirror i
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import TypeAlias
 
 from neurovis_layouts.alike import Move, shifted_by
@@ -40,13 +41,9 @@ def parts_by_cell(problem: LayoutProblem, pair: Mapping[int, int]) -> tuple[list
     seats = _seats(problem, pair)
     outer = {m.members: i for i, m in enumerate(problem.modules) if m.parent < 0}
     boxes = {members: i for i, (_, members) in enumerate(problem.boxes)}
-    found: list[Part] = []
-    for members in seats:
-        module = outer.get(members, -1)
-        if module >= 0:
-            found.append(part_of_module(problem, module))
-        else:
-            found.append(Part(members, box=boxes.get(members, -1)))
+    found = [
+        part_of_module(problem, outer[own]) if own in outer else Part(own, box=boxes.get(own, -1)) for own in seats
+    ]
     parts = imaged(sorted(found, key=lambda part: min(part.members)), pair)
     number = {frozenset(members): seat for members, seat in seats.items()}
     return parts, {k: number[frozenset(part.members)] for k, part in enumerate(parts)}
@@ -182,26 +179,22 @@ class _Page:
         self._page_cost = PageCost(problem, between, directed=False)
         #: parts that are copies of each other
         makes: dict[tuple[int, int], list[int]] = {}
-        for k, part in enumerate(parts):
-            if part.image_of < 0:
-                makes.setdefault((part.kind, -1 if part.kind >= 0 else k), []).append(k)
+        for k, part in enumerate(part for part in parts if part.image_of < 0):  # which come first
+            makes.setdefault((part.kind, -1 if part.kind >= 0 else k), []).append(k)
         self._makes = list(makes.values())
         self._directions = {own[0]: _directions(problem, parts[own[0]], pair, sketched) for own in self._makes}
         self._column = {k: slot.across for slot in slots for line in slot.lines for k in line}
-        self._costs: dict[_Shape, float] = {}
+        self._cost = cache(self._cost_of)
 
     def best(self) -> _Shape:
         """The shape that costs least of those found from where all is drawn as it comes, or turned one way."""
-        as_drawn = _Shape(
-            tuple(self._problem.direction for _ in self._parts), tuple(p.image_of >= 0 for p in self._parts)
-        )
-        starts = [as_drawn]
+        parts = self._parts
+        as_drawn = _Shape((self._problem.direction,) * len(parts), tuple(part.image_of >= 0 for part in parts))
+        starts = {as_drawn: None}
         for direction in _DIRECTIONS:
-            start = as_drawn
-            for own in self._makes:
-                start = start.turned(self._both(own), direction) if direction in self._directions[own[0]] else start
-            starts.append(start)
-        return min(map(self._settled, dict.fromkeys(starts)), key=self._cost)
+            may = [self._both(own) for own in self._makes if direction in self._directions[own[0]]]
+            starts[as_drawn.turned(set[int]().union(*may), direction)] = None
+        return min(map(self._settled, starts), key=self._cost)
 
     def stood(self, shape: _Shape, drawn: Drawn) -> list[tuple[Piece, Move]]:
         """The parts drawn in a shape, and where they stand."""
@@ -213,12 +206,9 @@ class _Page:
     def _settled(self, shape: _Shape) -> _Shape:
         """The best that is found by turning one make of parts after the other."""
         for _ in range(_ROUNDS):
-            before = shape
             for own in self._makes:
                 for direction in self._directions[own[0]]:
                     shape = self._better(shape, self._flipped(shape.turned(self._both(own), direction), own))
-            if shape == before:
-                break
         return shape
 
     def _flipped(self, shape: _Shape, own: Sequence[int]) -> _Shape:
@@ -236,11 +226,6 @@ class _Page:
 
     def _better(self, shape: _Shape, other: _Shape) -> _Shape:
         return other if self._cost(other) < self._cost(shape) - _NOTHING else shape
-
-    def _cost(self, shape: _Shape) -> float:
-        if shape not in self._costs:
-            self._costs[shape] = self._cost_of(shape)
-        return self._costs[shape]
 
     def _cost_of(self, shape: _Shape) -> float:
         moved = self.stood(shape, self._sketched)
@@ -299,7 +284,9 @@ def _slots(problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, in
     for i, own in sorted(held.items()):
         # what no cell names is behind what one does, and mirrored cells hold theirs in one order
         own.sort(key=lambda k: (parts[k].members not in named, k if parts[k].image_of < 0 else parts[k].image_of))
-        slots.append(Slot(*spans[i], tuple(_lines(parts, own))))
+        image = {parts[k].image_of: k for k in own}  # which stands beside it
+        lines = tuple((k, image[k]) if k in image else (k,) for k in own if parts[k].image_of not in own)
+        slots.append(Slot(*spans[i], lines))
     return slots
 
 
@@ -333,12 +320,9 @@ def _check_mirrors(
     problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int], pair: Mapping[int, int]
 ) -> None:
     for k, part in enumerate(parts):
-        first = part.image_of
-        if first < 0:
-            if not symmetric(part.members, pair):
-                continue
-            first = k
-        place = where[first]
+        if part.image_of < 0 and not symmetric(part.members, pair):
+            continue
+        place = where[part.image_of if part.image_of >= 0 else k]
         if where[k] != (place if place == len(problem.plan) else _mirrored(problem, place)):
             one = problem.neurons[min(part.members)]
             raise LayoutRefusalError(
@@ -347,15 +331,6 @@ def _check_mirrors(
                 "put mirror images into one row, as far to the left as to the right of the middle",
                 (one,),
             )
-
-
-def _lines(parts: Sequence[Part], held: Sequence[int]) -> Iterator[_Members]:
-    """The parts in one slot, mirror images beside each other."""
-    for k in held:
-        if parts[k].image_of in held:
-            continue
-        image = next((other for other in held if parts[other].image_of == k), None)
-        yield (k,) if image is None else (k, image)
 
 
 def _placed(

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import TypeAlias
+
+import networkx as nx
 
 from neurovis_layouts.routing.ends import Key, keys_of
 from neurovis_spec.layout.labels import instance_titles
@@ -38,11 +41,11 @@ class Book:
         for number, module in enumerate(modules):
             for member in module.members:
                 self._around[member].append(number)
-        self._root = list(range(len(modules)))
+        self._kinds = nx.utils.UnionFind(range(len(modules)))
         self._number = {module.path: number for number, module in enumerate(modules)}
         first: dict[str, int] = {}
         for number, module in enumerate(modules):
-            self._join(first.setdefault(module.template, number), number)
+            self._kinds.union(first.setdefault(module.template, number), number)
         self._pairs: dict[int, _Pairs] = {}
         self._lines: dict[int, _Lines] = {}
         for mirror in problem.mirrors:
@@ -51,19 +54,10 @@ class Book:
         for line in problem.align:
             self._align(-1, line)
         self._join_inner()
-        self._copies: dict[int, list[int]] = {}
-        for number in range(len(modules)):
-            self._copies.setdefault(self._find(number), []).append(number)
-        self._problems: dict[int, LayoutProblem] = {}
-
-    def _find(self, number: int) -> int:
-        while self._root[number] != number:
-            number = self._root[number]
-        return number
-
-    def _join(self, one: int, other: int) -> None:
-        low, high = sorted((self._find(one), self._find(other)))
-        self._root[high] = low
+        #: of each kind, which is known by its first instance, all
+        self._copies = {min(copies): sorted(copies) for copies in self._kinds.to_sets()}
+        self._kind = {number: kind for kind, copies in self._copies.items() for number in copies}
+        self.problem_of = cache(self._of)
 
     def _join_inner(self) -> None:
         """Instances at one place of instances of one kind are of one kind; outer ones come first."""
@@ -72,8 +66,8 @@ class Book:
         for number in sorted(range(len(modules)), key=lambda n: (modules[n].path.count("."), n)):
             module = modules[number]
             if module.parent >= 0:
-                place = self._find(module.parent), module.path.rpartition(".")[2]
-                self._join(first.setdefault(place, number), number)
+                place = self._kinds[module.parent], module.path.rpartition(".")[2]
+                self._kinds.union(first.setdefault(place, number), number)
 
     def _inside(self, scope: int, neuron: int) -> int:
         """The instance right below ``scope`` that a neuron is in, −1 without one."""
@@ -97,7 +91,7 @@ class Book:
                     "mirror the instances, or neurons outside of all instances",
                     (names[a], names[b]),
                 )
-            self._join(one, other)
+            self._kinds.union(one, other)
         self._pairs.setdefault(scope, []).append((a, b))
 
     def _align(self, scope: int, line: Sequence[int]) -> None:
@@ -114,19 +108,14 @@ class Book:
         problem = self._problem
         return replace(
             problem,
-            modules=tuple(replace(m, template=str(self._find(i))) for i, m in enumerate(problem.modules)),
+            modules=tuple(replace(m, template=str(self._kind[i])) for i, m in enumerate(problem.modules)),
             mirrors=_mirror(self._pairs.get(-1, [])),
             align=tuple(self._lines.get(-1, [])),
             plan=tuple(cell for cell in problem.plan if cell.scope < 0),
         )
 
-    def problem_of(self, kind: int) -> LayoutProblem:
-        """The problem of drawing one instance of this kind alone, its neurons numbered from 0."""
-        if kind not in self._problems:
-            self._problems[kind] = self._of(kind)
-        return self._problems[kind]
-
     def _of(self, kind: int) -> LayoutProblem:
+        """The problem of drawing one instance of this kind alone, its neurons numbered from 0."""
         copies = self._copies[kind]
         modules = self._problem.modules
         pairs: set[tuple[int, int]] = set()
@@ -148,7 +137,7 @@ class Book:
         titles = instance_titles((module.path, module.module) for module in modules)
         return replace(
             part,
-            modules=tuple(replace(m, template=str(self._find(self._number[m.path]))) for m in part.modules),
+            modules=tuple(replace(m, template=str(self._kind[self._number[m.path]])) for m in part.modules),
             mirrors=_mirror(sorted(pairs)),
             align=tuple(sorted(lines)),
             plan=tuple(sorted(cells, key=lambda cell: cell.members)),
