@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from scenes import scene_of
 
 import neurovis_spec as nv
+from neurovis_spec.layout.labels import WEIGHT, WIDEST
 from neurovis_spec.scene import Disc, Text
 from neurovis_spec.scene.beside import placed
 from neurovis_spec.scene.labels import _among_own
@@ -37,6 +39,34 @@ def test_every_neuron_of_a_row_has_a_label_shortened_where_there_is_no_room_for_
         assert text == LONG or (text.endswith("…") and LONG.startswith(text[:-1].rstrip()))
         assert len(text) >= 8
     assert all(LONG in group.title for group in scene.groups if group.data.get("neuron") in ("A1", "A2", "A3"))
+
+
+@pytest.mark.parametrize(
+    ("label", "lines"),
+    [
+        ("a neuron of the cord that drives the muscles beside it", 2),
+        ("a neuron of the ventral cord that drives all the muscles that are beside it", 3),
+        ("descending_interneuron_of_the_anterior_ganglion_type_four", 3),
+        ("of average length", 1),
+    ],
+)
+def test_a_long_name_stands_in_lines_beside_its_disc_where_there_is_room(label: str, lines: int) -> None:
+    names = [f"{letter}: {{label: '{letter} {label}'}}" for letter in "ABCD"]
+    spec = (
+        f"neurovis: 1\nname: long\nneurons: {{{', '.join(names)}}}\nconnections: {{A -> B: 1, B -> C: 1, C -> D: 1}}\n"
+    )
+    compiled = nv.compile_text(spec)
+    scene = scene_of(compiled, compiled.run(1).snapshot(0))
+    for group in scene.groups:
+        if "neuron" in group.data:
+            said = [shape for shape in group.shapes if isinstance(shape, Text)]
+            assert len(said) == lines
+            assert "".join(one.text for one in said).replace(" ", "") == f"{group.data['neuron']}{label}".replace(
+                " ", ""
+            )
+            assert max(width(one.text, one.size, WEIGHT) for one in said) <= WIDEST * said[0].size
+            assert {one.point[0] for one in said} == {said[0].point[0]}
+            assert all(b.point[1] - a.point[1] > a.size for a, b in pairwise(said))
 
 
 @example("obstacle_avoidance_interneuron", 1.0, 15.0)
@@ -119,7 +149,7 @@ def test_a_label_lies_on_lines_rather_than_on_the_border_of_a_frame(border: list
         np.zeros((1, 2)), np.full(1, 0.35), lines, np.array(border).reshape(-1, 2), (-3, -3, 3, 3), 50.0, False,
         np.zeros((0, 4)),
     )  # fmt: skip
-    found = placed([Wanted((0,), ((4.0,),))], field, lambda _: 10.0, 66.0)
+    found = placed([Wanted((0,), (((4.0, 1),),))], field, lambda _: 10.0, 66.0)
     assert (found[0] == (Slot(1, 0), 0)) is right
 
 
@@ -143,24 +173,24 @@ WALL = [(0.0, -1.0), (1.0, -0.7), (-1.0, -0.7), (1.0, 0.3), (-1.0, 0.3), (1.0, -
 
 def test_a_label_makes_way_for_one_that_has_no_room_elsewhere() -> None:
     ground = field([(0.0, 0.0), (0.0, 0.95), *WALL])
-    (alone,) = {slot for slot, _ in sides_of([Wanted((0,), ((5.0,),))], ground).values()}
+    (alone,) = {slot for slot, _ in sides_of([Wanted((0,), (((5.0, 1),),))], ground).values()}
     assert alone == BELOW
     # the other is more important, and would rather stand above
-    up = Wanted((1,), ((5.0,),), kept=(ABOVE,))
+    up = Wanted((1,), (((5.0, 1),),), kept=(ABOVE,))
     assert sides_of([up], ground) == {1: (ABOVE, 0)}
-    both = sides_of([up, Wanted((0,), ((5.0,),))], ground)
+    both = sides_of([up, Wanted((0,), (((5.0, 1),),))], ground)
     assert both[0] == (BELOW, 0)
     assert both[1][0] != ABOVE
 
 
 def test_a_name_is_cut_before_it_is_left_out_and_said_in_full_where_there_is_room() -> None:
     narrow = field([(0.0, 0.0), (0.0, 1.0), *WALL])  # beneath there is room for half of it
-    wordings = ((30.0,), (20.0,), (4.0,))
+    wordings = (((30.0, 1),), ((20.0, 1),), ((4.0, 1),))
     one = Wanted((0,), wordings, usual=1)
     assert sides_of([one], narrow) == {0: (BELOW, 2)}
     free = field([(0.0, 0.0)])
     assert sides_of([one], free) == {0: (BELOW, 0)}  # more than usual, as nothing is in the way
-    beside = Wanted((1,), ((8.0,),))
+    beside = Wanted((1,), (((8.0, 1),),))
     (_, first), (_, second) = sides_of([one, beside], field([(0.0, 0.0), (2.4, 0.4)], far=2.0)).values()
     assert (first, second) == (1, 0)  # but not where that is another's room
 
@@ -168,7 +198,7 @@ def test_a_name_is_cut_before_it_is_left_out_and_said_in_full_where_there_is_roo
 def test_names_of_one_line_stand_on_one_side() -> None:
     column = [(0.0, 2.0 * row) for row in range(6)]
     lines = [(0.0, 2.0 * row + (0.45 if row % 2 else -0.45)) for row in range(6)]  # beneath some, above the others
-    names = [Wanted((row,), ((3.0,),)) for row in range(6)]
+    names = [Wanted((row,), (((3.0, 1),),)) for row in range(6)]
     assert {slot for slot, _ in sides_of(names, field(column, lines)).values()} == {BELOW, ABOVE}
     lined = [replace(one, line=0) for one in names]
     assert len({slot for slot, _ in sides_of(lined, field(column, lines)).values()}) == 1
@@ -177,7 +207,7 @@ def test_names_of_one_line_stand_on_one_side() -> None:
 def test_names_of_a_close_row_stand_on_one_side_and_the_other_by_turns() -> None:
     """Where each finds its own side first those that come last find none."""
     row = field([(0.55 * place, 0.0) for place in range(8)])
-    names = [Wanted((place,), ((6.0,),), line=0) for place in (0, 3, 6, 1, 4, 7, 2, 5)]
+    names = [Wanted((place,), (((6.0, 1),),), line=0) for place in (0, 3, 6, 1, 4, 7, 2, 5)]
     found = sides_of(names, row)
     assert {found[place][0] for place in range(8)} == {BELOW, ABOVE}
     assert all(found[place][0] != found[place + 1][0] for place in range(7))
@@ -185,7 +215,7 @@ def test_names_of_a_close_row_stand_on_one_side_and_the_other_by_turns() -> None
 
 def test_no_name_is_nearer_to_another_disc_than_to_its_own_where_another_side_is_free() -> None:
     """Beneath a disc of a close column it could be the name of the next."""
-    names = [Wanted((row,), ((3.0,),)) for row in range(5)]
+    names = [Wanted((row,), (((3.0, 1),),)) for row in range(5)]
     close, wide = (field([(0.0, apart * row) for row in range(5)], far=2.0) for apart in (0.85, 2.0))
     assert all(slot.across for row, (slot, _) in sides_of(names, close).items() if 0 < row < 4)
     assert {slot for slot, _ in sides_of(names, wide).values()} == {BELOW}

@@ -22,6 +22,8 @@ WEIGHT, INSTANCE_WEIGHT, BOX_WEIGHT = 600, 600, 400
 SMALLEST, NUMBERED, TINY = 9.0, 7.5, 6.0
 #: The largest beside a disc; and how far its letters rise over their baseline and hang below it, in sizes.
 BESIDE, RISE, DROP = 11.0, 0.8, 0.25
+#: From a line of a label to the next, in sizes.
+LINE = 1.15
 #: Gaps between a disc and its label: to the side, below, above, at a corner.
 ASIDE, BELOW, ABOVE, CORNER = 5.0, 4.0, 4.0, 3.0
 #: How long a name beside a disc may be, in sizes of its letters: it must not look like a title of those around.
@@ -154,14 +156,15 @@ def instance_titles(modules: Iterable[tuple[str, str]]) -> list[float]:
     return [widest[module] for _, module in given]
 
 
-def beside(across: int, down: int, radius: float, wide: float, size: float) -> Rect:
-    """What letters cover beside a disc, from its centre, in page units: to the left or right (``across`` is −1 or 1),
-    above or below (``down``), or at a corner."""
-    high = (RISE + DROP) * size
+def beside(across: int, down: int, radius: float, wide: float, size: float, lines: int = 1) -> Rect:
+    """What letters, in so many lines, cover beside a disc, from its centre, in page units: to the left or right
+    (``across`` is −1 or 1), above or below (``down``), or at a corner."""
+    more = (lines - 1) * LINE * size
+    high = (RISE + DROP) * size + more
     if not across:
         top = radius + BELOW if down > 0 else -radius - ABOVE - high
         return -wide / 2, top, wide / 2, top + high
-    near, top = radius + ASIDE, (0.36 - RISE) * size
+    near, top = radius + ASIDE, (0.36 - RISE) * size - more / 2
     if down:
         near = 0.75 * radius + CORNER
         top = near - 0.08 * size if down > 0 else DROP * size - near - high

@@ -151,7 +151,7 @@ def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
             shapes = (disc, *marks_of(planned, index, readable(theme, fills[index])))
         if label is not None:
             ink = readable(theme, fills[index]) if label.on_disc else theme.ink
-            shapes = (*shapes, label.shape(ink, theme.box_fill))
+            shapes = (*shapes, *label.shapes(ink, theme.box_fill))
         groups.append(Group(shapes, f"n{index}", data, titles[index]))
     return groups
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from neurovis_spec.layout.geometry import Cells, Rect
 from neurovis_spec.layout.labels import (
     ASIDE,
     BESIDE,
+    DROP,
+    LINE,
     MOST,
     NUMBERED,
     RISE,
@@ -58,6 +60,8 @@ _SMALLEST_DISC = 7.0
 _SMALLEST_NUMBERED = 16.0
 #: to how much of its width a name is cut beside its disc, if there is no room for it, and how many letters it keeps
 _CUT, _LETTERS = (0.75, 0.5), 3
+#: In how many lines a long name is at most.
+_LINES = 3
 #: How much the label of a glyph moves up, for the number beneath it, in its sizes.
 _UP = 0.3
 #: How large the number on a glyph is whose label stands beside it, in radii, and how wide at most.
@@ -76,11 +80,17 @@ class Label:
     on_disc: bool
     #: it lies across a line
     crosses: bool = False
+    #: the lines below the first; the last of all has the subscript
+    below: tuple[str, ...] = ()
 
-    def shape(self, fill: str, halo: str) -> Text:
-        """The text in a colour; where it lies across a line, with a halo in another."""
-        around = halo if self.crosses else ""
-        return Text(self.point, self.text, self.size, fill, self.anchor, WEIGHT, self.subscript, self.on_disc, around)
+    def shapes(self, fill: str, halo: str) -> tuple[Text, ...]:
+        """Its lines in a colour; where it lies across a line, with a halo in another."""
+        around, (x, y) = halo if self.crosses else "", self.point
+        subscripts = (*("" for _ in self.below), self.subscript)
+        return tuple(
+            Text((x, y + row * LINE * self.size), text, self.size, fill, self.anchor, WEIGHT, sub, self.on_disc, around)
+            for row, (text, sub) in enumerate(zip((self.text, *self.below), subscripts, strict=True))
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +122,10 @@ class Ground:
     def radius(self, index: int) -> float:
         """The radius of a disc in the picture."""
         return float(self.radii[index]) * self.scale
+
+    def counts(self, index: int, count: int) -> bool:
+        """Whether a disc is large enough to say how many neurons it stands for."""
+        return size_of_count(count, self.radius(index)) > 0
 
 
 def as_count(size: int) -> str:
@@ -154,22 +168,10 @@ def labels_of(
     for one, other in partners.items():
         if result[other] is None:
             result[one] = None
-    needed = {both: _radius_for(both) for both in set(parts)}
-    until = [
-        max(needed[both], _SMALLEST_NUMBERED if index in numbered else _SMALLEST_DISC) / float(radius)
-        for index, (both, radius) in enumerate(zip(parts, ground.radii.tolist(), strict=True))
-    ]
-    for group in neurons.groups:  # what is numbered together stands alike
-        counted = [index for index in group.indices if parts[index][1]]
-        latest = max((until[index] for index in counted), default=0.0)
-        for index in counted:
-            until[index] = latest
     alone = _told_alone(network, ground, chosen)
-    words = _whole(network)
-    for index, count in numbered.items():
-        if not size_of_count(count, ground.radius(index)):
-            words[index] = neurons.labels[index], as_count(count)
-    beside = _beside(network, ground, obstacles, words, until, sides, alone, chosen)
+    words = _whole(network, {index: count for index, count in numbered.items() if not ground.counts(index, count)})
+    called = _Called(words, _until(network, ground, parts, numbered), alone)
+    beside = _beside(network, ground, obstacles, chosen, called, sides)
     for index in chosen:  # it is easier to read beside a disc than where it has to be very small
         result[index] = beside.get(index) or result[index]
     for index, label in beside.items():
@@ -184,6 +186,23 @@ def labels_of(
         if result[other] is None:
             result[one] = None
     return result
+
+
+def _until(
+    network: Network, ground: Ground, parts: Sequence[tuple[str, str]], numbered: Collection[int]
+) -> list[float]:
+    """From which scale on each label stands on its disc; what is numbered together stands alike."""
+    needed = {both: _radius_for(both) for both in set(parts)}
+    until = [
+        max(needed[both], _SMALLEST_NUMBERED if index in numbered else _SMALLEST_DISC) / float(radius)
+        for index, (both, radius) in enumerate(zip(parts, ground.radii.tolist(), strict=True))
+    ]
+    for group in network.neurons.groups:
+        counted = [index for index in group.indices if parts[index][1]]
+        latest = max((until[index] for index in counted), default=0.0)
+        for index in counted:
+            until[index] = latest
+    return until
 
 
 def raised(labels: Sequence[Label | None], sizes: Mapping[int, int]) -> list[Label | None]:
@@ -222,38 +241,44 @@ def size_beside(radius: float) -> float:
     return min(BESIDE, max(_BESIDE_SMALLEST, _BESIDE_SHARE * radius))
 
 
+@dataclass(frozen=True, slots=True)
+class _Called:
+    """What is said of each neuron beside its disc, from which scale on a label stands on it, and whose number ``alone``
+    says who they are: their names are not cut."""
+
+    words: Sequence[tuple[str, str]]
+    until: Sequence[float]
+    alone: frozenset[int]
+
+
 def _beside(
     network: Network,
     ground: Ground,
     obstacles: Obstacles,
-    words: Sequence[tuple[str, str]],
-    until: Sequence[float],
-    sides: Mapping[int, Side],
-    alone: frozenset[int],
     chosen: Sequence[int],
+    called: _Called,
+    sides: Mapping[int, Side],
 ) -> dict[int, Label]:
-    """Labels beside discs that say these ``words``, by neuron, as far as there is room for them at this scale or a
-    smaller one, on the ``sides`` with room for them if that is enough; from the scale ``until`` on a label stands on
-    its disc. Those whose number ``alone`` says who they are are not cut."""
-    among, partners = set(chosen), partners_of(network)
-    cut = Cut(base for base, _ in words)
-    lines = _lines(network, ground, chosen)
-    said: dict[int, list[tuple[str, str]]] = {}
+    """Labels beside discs, by neuron, as far as there is room for them at this scale or a smaller one, on the ``sides``
+    with room for them if that is enough."""
+    among, partners, words = set(chosen), partners_of(network), called.words
+    cut, lines = Cut(base for base, _ in words), _lines(network, ground, chosen)
+    said: dict[int, list[_Saying]] = {}
     wanted: list[Wanted] = []
     for index in [index for index in rank_of(network) if index in among][:MOST]:
         if index in said:
             continue
         partner = partners.get(index, index)
         members = (index, partner) if partner != index and partner in among else (index,)
-        wordings, usual = _wordings([words[one] for one in members], cut, not alone.issuperset(members))
+        wordings, usual = _wordings([words[one] for one in members], cut, not called.alone.issuperset(members))
         said |= {one: [wording[place] for wording in wordings] for place, one in enumerate(members)}
         kept = [Slot(*STEPS[sides[one]]) for one in members if one in sides]
         wanted.append(
             Wanted(
                 members,
-                tuple(tuple(_wide(one) for one in wording) for wording in wordings),
+                tuple(tuple((_wide(one), len(one[0])) for one in wording) for wording in wordings),
                 usual,
-                max(until[one] for one in members),
+                max(called.until[one] for one in members),
                 tuple(kept) if len(kept) == len(members) else (),
                 lines.get(index, -1),
                 ground.outward.get(index),
@@ -261,18 +286,21 @@ def _beside(
         )
     level, taken = _level(network), (ground.taken - np.tile(ground.shift, 2)) / ground.scale
     field = Field(ground.places, ground.radii, ground.dots, ground.borders, ground.extent, ground.reach, level, taken)
-    found = placed(wanted, field, size_beside, ground.scale)
     result: dict[int, Label] = {}
-    for index, (slot, wording) in found.items():
-        own, size = said[index][wording], size_beside(ground.radius(index))
-        width = _wide(own, size)
-        x0, y0, _, _ = slot.text(ground.radius(index), width, size)
-        x, y = ground.centre(index)
-        anchor: Literal["start", "middle", "end"] = ("end", "middle", "start")[slot.across + 1]
-        start = x + x0 + width * (1 - slot.across) / 2
-        label = Label(*own, size, (start, y + y0 + RISE * size), anchor, False)
+    for index, (slot, wording) in placed(wanted, field, size_beside, ground.scale).items():
+        label = _at(said[index][wording], slot, ground.centre(index), ground.radius(index))
         result[index] = replace(label, crosses=obstacles.crossed(_rect(label)))
     return result
+
+
+def _at(said: _Saying, slot: Slot, centre: Point, radius: float) -> Label:
+    """What is said on a side of a disc."""
+    size, ((first, *below), subscript) = size_beside(radius), said
+    width = _wide(said, size)
+    x0, y0, _, _ = slot.text(radius, width, size, 1 + len(below))
+    anchor: Literal["start", "middle", "end"] = ("end", "middle", "start")[slot.across + 1]
+    point = centre[0] + x0 + width * (1 - slot.across) / 2, centre[1] + y0 + RISE * size
+    return Label(first, subscript, size, point, anchor, False, below=tuple(below))
 
 
 def _told_alone(network: Network, ground: Ground, chosen: Sequence[int]) -> frozenset[int]:
@@ -322,33 +350,61 @@ def _lines(network: Network, ground: Ground, chosen: Sequence[int]) -> dict[int,
     return {index: number for number, members in enumerate([*lines, *alone.values()]) for index in members}
 
 
-def _wordings(words: Sequence[tuple[str, str]], cut: Cut, shorter: bool) -> tuple[list[list[tuple[str, str]]], int]:
-    """What can be said of neurons that are labelled alike, from all of their names on; and which of these is usual: so
-    much of a name that it does not look like a title of those around. It may be ``shorter``, too."""
-    usual = [min(_wide(both), WIDEST) for both in words]
-    found = [list(words)]
+#: What is said of a neuron: lines, and a subscript behind the last.
+_Saying: TypeAlias = tuple[tuple[str, ...], str]
+
+
+def _wordings(words: Sequence[tuple[str, str]], cut: Cut, shorter: bool) -> tuple[list[list[_Saying]], int]:
+    """What can be said of neurons that are labelled alike, from all of their names on; and which of these is usual: a
+    name in a line, but so long a one that it would look like a title of those around in several. It may be ``shorter``,
+    too."""
+    whole: list[_Saying] = [((text,), sub) for text, sub in words]
+    wide = [_wide(both) for both in whole]
+    found = [whole]
+    if max(wide) > WIDEST:
+        found.append([_in_lines(*both) for both in words])
     for share in (1.0, *_CUT) if shorter else (1.0,):
-        said = [cut.parts(*both, 1.0, share * wide) for both, wide in zip(words, usual, strict=True)]
-        if said != found[-1] and all(len(text) > _LETTERS or (text, sub) in words for text, sub in said):
+        parts = [cut.parts(*both, 1.0, share * min(each, WIDEST)) for both, each in zip(words, wide, strict=True)]
+        said: list[_Saying] = [((text,), sub) for text, sub in parts]
+        if said != found[-1] and all(len(text) > _LETTERS or (text, sub) in words for text, sub in parts):
             found.append(said)
-    return found, int(max(_wide(both) for both in words) > WIDEST)
+    return found, int(max(wide) > WIDEST)
 
 
-def _whole(network: Network) -> list[tuple[str, str]]:
-    """What is said of each neuron beside its disc, and a subscript: a name that keeps all of its letters."""
-    labelled = zip(network.neurons.labels, parts_of(network.neurons), strict=True)
-    return [parts if label == "".join(parts) else (label, "") for label, parts in labelled]
+def _in_lines(text: str, subscript: str) -> _Saying:
+    """A name in as many lines as it takes, at most ``_LINES``, of about equal length."""
+    lines = texts.wrapped(text, 1.0, WIDEST, WEIGHT)
+    if len(lines) > _LINES:
+        last = texts.shorten("".join(lines[_LINES - 1 :]), 1.0, WIDEST, WEIGHT)
+        return (*lines[: _LINES - 1], last), subscript
+    low, high = 0.0, WIDEST
+    for _ in range(8):
+        middle = (low + high) / 2
+        low, high = (low, middle) if len(texts.wrapped(text, 1.0, middle, WEIGHT)) <= len(lines) else (middle, high)
+    return tuple(texts.wrapped(text, 1.0, high, WEIGHT)), subscript
 
 
-def _wide(said: tuple[str, str], size: float = 1.0) -> float:
-    return texts.width(said[0], size, WEIGHT, said[1])
+def _whole(network: Network, numbered: Mapping[int, int]) -> list[tuple[str, str]]:
+    """What is said of each neuron beside its disc, and a subscript: a name that keeps all of its letters; of those that
+    are ``numbered`` how many neurons they are."""
+    labelled = enumerate(zip(network.neurons.labels, parts_of(network.neurons), strict=True))
+    return [
+        (label, as_count(numbered[index])) if index in numbered else parts if label == "".join(parts) else (label, "")
+        for index, (label, parts) in labelled
+    ]
+
+
+def _wide(said: _Saying, size: float = 1.0) -> float:
+    *lines, last = said[0]
+    return max([texts.width(last, size, WEIGHT, said[1]), *(texts.width(line, size, WEIGHT) for line in lines)])
 
 
 def _rect(label: Label) -> Rect:
     """What a label beside a disc covers."""
-    width, (x, y) = texts.width(label.text, label.size, WEIGHT, label.subscript), label.point
+    width, (x, y) = _wide(((label.text, *label.below), label.subscript), label.size), label.point
     left = x - {"start": 0.0, "middle": width / 2, "end": width}[label.anchor]
-    return left - 2, y - 0.8 * label.size, left + width + 2, y + 0.25 * label.size
+    bottom = y + (DROP + LINE * len(label.below)) * label.size
+    return left - 2, y - RISE * label.size, left + width + 2, bottom
 
 
 def margin_beside(
@@ -359,10 +415,7 @@ def margin_beside(
 ) -> float:
     """How far labels may reach beyond the discs at the rim: 0 where all fit on discs of this radius, or have ``rooms``
     kept for them in a picture that is not reduced. Those of glyphs that are ``numbered`` may have to say so."""
-    words = _whole(network)
-    for index, count in numbered.items():
-        if not size_of_count(count, radius):
-            words[index] = network.neurons.labels[index], as_count(count)
+    words = _whole(network, {index: count for index, count in numbered.items() if not size_of_count(count, radius)})
     cut = Cut(base for base, _ in words)
     kept = rooms if radius >= _BESIDE_SMALLEST / _BESIDE_SHARE else ()
     named = [both for index, both in enumerate(zip(words, parts_of(network.neurons), strict=True)) if index not in kept]
@@ -371,7 +424,7 @@ def margin_beside(
     ):
         return 0.0
     said = [cut.parts(*own, 1.0, WIDEST) for own, _ in named]
-    return max((_wide(own, size_beside(radius)) for own in said), default=0.0) + ASIDE + 3
+    return max((_wide(((text,), sub), size_beside(radius)) for text, sub in said), default=0.0) + ASIDE + 3
 
 
 def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:

@@ -175,14 +175,7 @@ def plan(
             *_bundle_groups(network, page.bundles, theme, 0 if begin is None else begin.step),
             *_dotted_groups(content, page, theme, many=True),
         ),
-        front=(
-            *(
-                Group(backed(text) if content.said else (text,), id=f"label:{entry}")
-                for entry, text in said.lines.items()
-            ),
-            *(Group((said.titles[index],), id=f"title:{page.boxes[index].path}") for index in sorted(said.titles)),
-            *framed.around(content.notes, theme),
-        ),
+        front=(*_in_front(content, page, said), *framed.around(content.notes, theme)),
         captioned=None if framed.title is None else lowered(framed.title, frame.width),
         unit=1.0,
         notes=content.notes,
@@ -357,6 +350,14 @@ def _texts(content: _Content, page: _OnPage, settings: RenderSettings) -> _Texts
     others = elsewhere([titled[index] for index in left], obstacles, theme, unsaid)
     titles |= {index: text for index, text in zip(left, others, strict=True) if text is not None}
     return _Texts(titles, labels, lines)
+
+
+def _in_front(content: _Content, page: _OnPage, said: _Texts) -> Iterator[Group]:
+    """The labels of connections, and the titles."""
+    for entry, text in said.lines.items():
+        yield Group(backed(text) if content.said else (text,), id=f"label:{entry}")
+    for index in sorted(said.titles):
+        yield Group((said.titles[index],), id=f"title:{page.boxes[index].path}")
 
 
 def _ground(content: _Content, page: _OnPage) -> Ground:
@@ -547,36 +548,12 @@ def _framed(wanted: _Wanted, widths: FloatArray) -> _Framed:
 
 def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[str | None, list[LegendEntry], Frame]:
     """The title, the legend's entries, and the frame. In a picture too small for them both go."""
-    content, settings, theme = wanted.content, wanted.settings, wanted.theme
-    network = content.network
+    content, settings, network = wanted.content, wanted.settings, wanted.content.network
     words = settings.title if isinstance(settings.title, str) else network.title or network.name
     title = words if settings.title is not False and words else None
-    wide, high = MOST if settings.size is None else settings.size
-    items: list[LegendEntry] = []
-    if settings.legend:
-        contents = legend.Contents(
-            signals=content.signals if len(network.connections) else None,
-            learns=len(network.changing) > 0,
-            teaches=label_of([guide.first for guide in content.guides]) if content.guides else "",
-            delays=delayed,
-            lesions=bool(content.lesions),
-            ends=content.ends,
-            styles=content.styles,
-            traces=_least_and_most(told_times(network, seconds_of(network))),
-            sent_traces=_least_and_most(told_times(network, sent_seconds_of(network))),
-            unit=network.dt_unit,
-            seen="" if content.near is None else called(network.layout.view),
-            pathways=bool(content.said) and settings.labels,
-            bundles=bundles.told(content.left),
-        )
-        for brief in (False, True):
-            items = legend.entries(contents, gains, theme, brief=brief)
-            widest = max(item.width for item in items)
-            if widest <= wide - 2 * MARGIN and legend.height(items, wide - 2 * MARGIN) <= 0.4 * high:
-                break
-        else:
-            items = []
-    if title is not None and high < 4 * HEADER:
+    room = MOST if settings.size is None else settings.size
+    items = _explained(wanted, gains, delayed, room) if settings.legend else []
+    if title is not None and room[1] < 4 * HEADER:
         title = None
     noted = max((texts.width(note, CAPTION) for note in content.notes), default=0.0)
     across = max(noted, texts.width(title, TITLE, 600) if title is not None else 0.0)
@@ -596,6 +573,32 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
         if said is None or lowered(said, frame.width) <= MOST_TITLE * frame.height:
             break
     return said, items, frame
+
+
+def _explained(wanted: _Wanted, gains: Gains, delayed: str, room: tuple[float, float]) -> list[LegendEntry]:
+    """The entries of the legend; none where these would take too much of such a picture."""
+    content, network, (wide, high) = wanted.content, wanted.content.network, room
+    contents = legend.Contents(
+        signals=content.signals if len(network.connections) else None,
+        learns=len(network.changing) > 0,
+        teaches=label_of([guide.first for guide in content.guides]) if content.guides else "",
+        delays=delayed,
+        lesions=bool(content.lesions),
+        ends=content.ends,
+        styles=content.styles,
+        traces=_least_and_most(told_times(network, seconds_of(network))),
+        sent_traces=_least_and_most(told_times(network, sent_seconds_of(network))),
+        unit=network.dt_unit,
+        seen="" if content.near is None else called(network.layout.view),
+        pathways=bool(content.said) and wanted.settings.labels,
+        bundles=bundles.told(content.left),
+    )
+    for brief in (False, True):
+        items = legend.entries(contents, gains, wanted.theme, brief=brief)
+        widest = max(item.width for item in items)
+        if widest <= wide - 2 * MARGIN and legend.height(items, wide - 2 * MARGIN) <= 0.4 * high:
+            return items
+    return []
 
 
 def _top(title: str | None, width: float, notes: int) -> float:

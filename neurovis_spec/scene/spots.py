@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,8 @@ from neurovis_spec.layout.model import Point
 
 #: Between a label and the middle of a line that does not touch it, in page units.
 _LINE = 2.5
+#: Labels by which it is known how what they cover grows: of no width, of one size, of two lines.
+_GROWING: Final = ((0.0, 1), (1.0, 1), (0.0, 2))
 #: How far labels may reach beyond the discs at the rim, in page units; where more is asked for, so much and a share of
 #: the width.
 BEYOND, _ALWAYS, _SHARE = 20.0, 50.0, 0.3
@@ -35,13 +38,13 @@ class Slot:
     across: int
     down: int
 
-    def text(self, radius: float, width: float, size: float) -> Rect:
-        """What the letters cover, from the centre of the disc."""
-        return beside(self.across, self.down, radius, width, size)
+    def text(self, radius: float, width: float, size: float, lines: int = 1) -> Rect:
+        """What the letters cover, in so many lines, from the centre of the disc."""
+        return beside(self.across, self.down, radius, width, size, lines)
 
-    def claim(self, radius: float, width: float, size: float) -> Rect:
+    def claim(self, radius: float, width: float, size: float, lines: int = 1) -> Rect:
         """The same with a little air, and all between it and the disc."""
-        x0, y0, x1, y1 = self.text(radius, width, size)
+        x0, y0, x1, y1 = self.text(radius, width, size, lines)
         x0, y0, x1, y1 = x0 - 2, y0 - 1, x1 + 2, y1 + 1
         inner = radius if not (self.across and self.down) else 0.75 * radius
         if self.across:
@@ -65,14 +68,18 @@ _SIDES = tuple(Slot(*side) for side in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, -1
 _LEVEL = (*_SIDES[2:4], *_SIDES[:2], *_SIDES[4:])
 
 
+#: How wide a label is, in sizes, and how many lines it has.
+Extent: TypeAlias = tuple[float, int]
+
+
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """Neurons that have a label all or none, with mirrored sides; how wide the labels of all of them are, in sizes, in
-    each ``wording`` from the longest on; which wording is the ``usual`` one, which others give way to; the scale from
-    which they stand on their discs."""
+    """Neurons that have a label all or none, with mirrored sides; how wide the labels of all of them are, in sizes, and
+    in how many lines, in each ``wording`` from the longest on; which wording is the ``usual`` one, which others give
+    way to; the scale from which they stand on their discs."""
 
     members: tuple[int, ...]
-    wordings: tuple[tuple[float, ...], ...]
+    wordings: tuple[tuple[Extent, ...], ...]
     usual: int = 0
     until: float = np.inf
     #: where the layout kept room for them
@@ -152,7 +159,7 @@ class Spots:
         self._number = {slot: number for number, slot in enumerate(field.sides)}
         self._scale = 1.0
         self._known: dict[tuple[int, int], list[Spot]] = {}
-        self._shapes: dict[float, tuple[FloatArray, FloatArray]] = {}
+        self._shapes: dict[float, tuple[FloatArray, FloatArray, FloatArray]] = {}
 
     def begin(self, scale: float) -> None:
         """Go on to a scale, in page units for a layout unit."""
@@ -174,8 +181,8 @@ class Spots:
         one = self._wanted[number]
         return np.concatenate(
             [
-                self._rects(index, width, [self._number[slot]])[0]
-                for index, width, slot in zip(one.members, one.wordings[wording], sides, strict=True)
+                self._rects(index, extent, [self._number[slot]])[0]
+                for index, extent, slot in zip(one.members, one.wordings[wording], sides, strict=True)
             ]
         )
 
@@ -210,19 +217,20 @@ class Spots:
             found.append(Spot(options[option], claims, misread, borders, lines, dots, elsewhere))
         return sorted(found, key=lambda spot: spot.worth)
 
-    def _rects(self, index: int, width: float, slots: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    def _rects(self, index: int, extent: Extent, slots: Sequence[int]) -> tuple[FloatArray, FloatArray]:
         """What a label claims, and what its letters cover, on each of these sides, (k, 4)."""
         radius = float(self._field.radii[index])
-        if radius not in self._shapes:  # both grow with the width of the label alone
+        if radius not in self._shapes:  # both grow with the width and the lines of the label alone
             page, size = radius * self._scale, self._size_of(radius * self._scale)
             shapes = [
-                [[outline(slot, page, wide, size) for slot in self._field.sides] for wide in (0.0, 1.0)]
+                [[outline(slot, page, wide, size, lines) for slot in self._field.sides] for wide, lines in _GROWING]
                 for outline in (Slot.claim, Slot.text)
             ]
-            none, one = np.array(shapes).transpose(1, 0, 2, 3) / self._scale
-            self._shapes[radius] = none, size * (one - none)
-        none, each = self._shapes[radius]
-        claims, letters = (none + width * each)[:, slots] + np.tile(self._field.places[index], 2)
+            none, wider, higher = np.array(shapes).transpose(1, 0, 2, 3) / self._scale
+            self._shapes[radius] = none, size * (wider - none), higher - none
+        none, each, line = self._shapes[radius]
+        width, lines = extent
+        claims, letters = (none + width * each + (lines - 1) * line)[:, slots] + np.tile(self._field.places[index], 2)
         return claims, letters
 
     def _free(self, claims: FloatArray, index: int) -> npt.NDArray[np.bool_]:

@@ -7,10 +7,14 @@ can still be told apart: the beginning of a name and an ellipsis, or its end, if
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from neurovis_spec.text_width import FAMILIES, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, width, with_subscript
+
+#: A part of a word behind which a line may end.
+_PARTS = re.compile(r"[^_\-./]*[_\-./]+|[^_\-./]+")
 
 __all__ = [
     "FAMILIES",
@@ -43,8 +47,8 @@ def _begun(text: str, end: int) -> str:
 
 
 def wrapped(text: str, size: float, room: float, weight: int = 400) -> list[str]:
-    """The text in as many lines as it takes, each no wider than ``room``: broken between words, within a word where it
-    is wider by itself; at least a letter a line.
+    """The text in as many lines as it takes, each no wider than ``room``: broken between words and behind ``_-./``,
+    anywhere where a word is wider by itself; at least a letter a line.
 
     >>> wrapped("a title of several words", 10, 60)
     ['a title of', 'several', 'words']
@@ -52,8 +56,8 @@ def wrapped(text: str, size: float, room: float, weight: int = 400) -> list[str]
     ['extraor', 'dinarily']
     """
     lines = [""]
-    for word in text.split():
-        longer = f"{lines[-1]} {word}".lstrip()
+    for between, word in _words(text):
+        longer = f"{lines[-1]}{between}{word}"
         if width(longer, size, weight) <= room:
             lines[-1] = longer
             continue
@@ -65,6 +69,13 @@ def wrapped(text: str, size: float, room: float, weight: int = 400) -> list[str]
             word = word[max(end, 1) :]
         lines[-1] = word
     return lines
+
+
+def _words(text: str) -> Iterator[tuple[str, str]]:
+    """What a text can be broken into, and what is before each within a line."""
+    for number, word in enumerate(text.split()):
+        for place, part in enumerate(_PARTS.findall(word)):
+            yield " " if number and not place else "", part
 
 
 def number(value: float, digits: int = 3, sign: bool = False) -> str:

@@ -132,6 +132,8 @@ export class Zoom {
     if (ink === 1 || !(Object.keys(data).length || /^(box|instance|title):/.test(id))) return group;
     const { notch } = /** @type {Scene} */ (this.scene).constants,
       [head, tail] = shapes.filter(({ kind }) => kind === 'head');
+    /** @type {{from: number[], to: number[]} | null} the first line of a label beside a disc: others stay below it */
+    let line = null;
     return {
       ...group,
       shapes: shapes.map((shape) => {
@@ -161,7 +163,9 @@ export class Zoom {
             const [dx, dy] = [0, 1].map((axis) => shape.at[axis] - first.at[axis]),
               far = Math.hypot(dx, dy);
             const share = far > first.radius ? ink + ((1 - ink) * first.radius) / far : ink;
-            made.at = [first.at[0] + share * dx, first.at[1] + share * dy];
+            const { from, to } = line ?? { from: shape.at, to: [first.at[0] + share * dx, first.at[1] + share * dy] };
+            made.at = [0, 1].map((axis) => to[axis] + ink * (shape.at[axis] - from[axis]));
+            if (far > first.radius) line = { from, to };
           }
         }
         if (shape.kind === 'box' && data.connection !== undefined) {
