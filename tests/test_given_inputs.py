@@ -140,5 +140,7 @@ def test_pictures_trace_what_is_given(network: nv.CompiledNetwork, tmp_path: Pat
 
 
 def test_renaming_an_input_reaches_its_traces() -> None:
-    document, place = marked(SPEC.replace("  push: {}", "  push¦: {}"))
-    assert apply(document, rename(document, place, "shove")).source == SPEC.replace("push", "shove")
+    spec = SPEC.replace("[touch.given,", "[touch.given, 'touch[1].given',")
+    for name, new in (("push", "shove"), ("touch", "skin")):
+        document, place = marked(spec.replace(f"  {name}:", f"  {name}¦:"))
+        assert apply(document, rename(document, place, new)).source == spec.replace(name, new)

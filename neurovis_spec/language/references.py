@@ -46,10 +46,10 @@ class DottedName(Characters):
 
     @property
     def steps(self) -> tuple[Characters, ...]:
-        """What stands between the dots, in order."""
+        """What stands between the dots, in order, without the number of one of several (``touch[2]``)."""
         result, start = [], self.start
         for step in self.text.split("."):
-            result.append(Characters(step, start))
+            result.append(Characters(step.partition("[")[0], start))
             start += len(step) + 1
         return tuple(result)
 
