@@ -252,17 +252,18 @@ class Texts(NamedTuple):
 
 def texts_of(parts: Iterable[tuple[Texts | None, int]]) -> Texts | None:
     """The texts of all parts, one behind the other, of which each has so many, or none; None where none has any."""
+    every = [*parts]
+    if all(texts is None for texts, _ in every):
+        return None
     number_of: dict[str, int] = {}
     found: list[Indices] = []
-    given = False
-    for texts, count in parts:
+    for texts, count in every:
         if texts is None:
             found.append(np.full(count, -1, dtype=np.int8))
-            continue
-        given = True
-        moved = [number_of.setdefault(text, len(number_of)) for text in texts.known]
-        found.append(np.array([*moved, -1], dtype=np.int64)[texts.numbers])
-    return Texts(tuple(number_of), frozen(narrow(np.concatenate(found)))) if given else None
+        else:
+            moved = [number_of.setdefault(text, len(number_of)) for text in texts.known]
+            found.append(np.array([*moved, -1], dtype=np.int64)[texts.numbers])
+    return Texts(tuple(number_of), frozen(narrow(np.concatenate(found))))
 
 
 def _alike(part: npt.NDArray[Any]) -> bytes:

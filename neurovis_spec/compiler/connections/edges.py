@@ -107,9 +107,9 @@ class End:
         if self.positions is UNKNOWN:
             known = (self.directory.find(name) is not None or name in self.by_id for name in names)
             return np.array([0 if one else -1 for one in known], dtype=np.int64)
-        places = {name: (self.positions.get(name, -1),) for name in names}
+        places: dict[str, tuple[int, ...]] = {name: (self.positions.get(name, -1),) for name in names}
         if self.by_id:
-            places |= {name: self.called_by(name) for name, (place,) in places.items() if place < 0}
+            places |= {name: self.called_by(name) for name, place in places.items() if place == (-1,)}
         return np.array([found[0] if len(found) == 1 else -1 for found in map(places.__getitem__, names)], np.int64)
 
     def called_by(self, name: str) -> tuple[int, ...]:
@@ -244,8 +244,8 @@ class EdgeReader:
             return
         if len(end.called_by(name)) > 1:
             message = f"'{shorten(name)}'{where} is the id of {len(end.called_by(name))} {what}s of this entry"
-            hint = "name the neuron, or give the groups entries of their own"
-            self.constants.findings.error("edge-outside", span, message, hint, key=(what, where, name))
+            advice = "name the neuron, or give the groups entries of their own"
+            self.constants.findings.error("edge-outside", span, message, advice, key=(what, where, name))
             return
         hint = suggest(name, few(name, end.names), "neurons" if end.positions is UNKNOWN else f"{what}s of this entry")
         message, lost = f"'{shorten(name)}'{where} is not among the {what}s of this entry", None

@@ -337,9 +337,10 @@ class Expander:
     def _check_keys(self, model: InstanceModel, module: Module) -> None:
         """What ``set`` and ``inputs`` name must be the module's."""
         inner = module.model
-        matrices = names_of(inner, "matrices", inner.matrices)
+        settable: dict[str, object] = {**inner.parameters, **inner.matrices}
+        parameters, matrices = (names_of(inner, part, settable) for part in ("parameters", "matrices"))
         parts: tuple[tuple[str, Mapping[str, object], str, Collection[str]], ...] = (
-            ("set", model.set, "parameter", names_of(inner, "parameters", inner.parameters).over(matrices)),
+            ("set", model.set, "parameter", parameters.over(matrices)),
             ("inputs", model.inputs, "input", names_of(inner, "inputs", inner.inputs)),
         )
         for part, given, what, known in parts:
