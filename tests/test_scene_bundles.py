@@ -162,6 +162,27 @@ def test_single_neurons_are_their_own_hubs_and_glyphs_say_what_they_hold() -> No
     assert all(math.dist(tip, disc.centre) < disc.radius + 12 for tip in heads)
 
 
+def test_what_is_left_out_between_two_neurons_is_a_thin_line_beneath_the_others() -> None:
+    names = "ABCDEFG"
+    lines = ", ".join(f"{a} -> {b}: {-1 if b == 'G' else 1}" for a in names for b in names if a != b)
+    network = nv.compile_text(
+        f"neurovis: 1\nname: x\nneurons: {{{', '.join(f'{name}: {{}}' for name in names)}}}\n"
+        f"connections: {{{lines}}}\nlayout: {{engine: circular}}\n"
+    )
+    scene = drawn(network)
+    bundles, ids = bundles_of(scene), [group.id for group in scene.groups]
+    assert len(bundles) == 42 - 20
+    first = min(place for place, id_ in enumerate(ids) if re.fullmatch(r"c\d+", id_))
+    for name, bundle in bundles.items():
+        assert ids.index(bundle.id) < first
+        (band,) = [shape for shape in bundle.shapes if isinstance(shape, Spline)]
+        assert band.width < 1
+        assert ("inhibit" in bundle.data) == name.endswith("G")
+    words = [shape.text for group in scene.groups for shape in group.shapes if isinstance(shape, Text)]
+    assert "left out" in words
+    assert not any("added up" in word for word in words)
+
+
 def test_both_of_a_symmetric_pair_are_counted_and_neither_way_is_missing() -> None:
     network = nv.compile_text(
         "neurovis: 1\nname: x\nneurons: {A: {count: 3}, B: {count: 4}}\nlayout: {engine: grid}\n"

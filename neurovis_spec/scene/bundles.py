@@ -3,6 +3,7 @@
 In: pathways of what is left out, where neurons, boxes and texts stand. Out: a Bundle for each: a band for what excites,
 one beside it for what inhibits, as both added up would hide either. They lie above lines and beneath neurons, each as
 wide as the root of its sum says. A band begins and ends at the hub of a group, beside its name where no box says it.
+What is left out between two neurons is as thin as lines, and lies beneath these.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from neurovis_spec.scene.themes import mixed
 _WIDEST, _NARROWEST, _CROWD = 11.0, 1.8, 8
 #: More bundles than this are no help.
 _MOST = 5000
-#: How much of its colour there is in a band.
-_SHARE = 0.5
+#: How much of its colour there is in a band, and in one between two neurons; how wide that is.
+_SHARE, _LONE_SHARE, _THIN = 0.5, 0.3, 0.7
 #: Of the way between two hubs this is a band at least.
 _BETWEEN = 0.6
 #: How far a band bends to its right, as a share of its length; what bands beside each other keep between them.
@@ -60,10 +61,12 @@ class Band:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bundle:
-    """What is left out of a pathway, as it is drawn."""
+    """What is left out of a pathway, as it is drawn. Where it is ``lone``, a connection between two neurons, nothing is
+    added up, and it is thin and pale, beneath the lines."""
 
     pathway: Pathway
     bands: tuple[Band, ...]
+    lone: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +101,7 @@ def bundled(left: Sequence[Pathway], ground: Ground, theme: Theme) -> Bundles:
         for group, hub in wanted
         if group.count > 1 and group.name not in ground.named
     ]
-    bundles = _drawn(left, hubs, ground.picture)
+    bundles = _drawn(left, hubs, ground)
     bands = [band for one in bundles for band in one.bands]
     dots = samples([band.line.points for band in bands], 24)
     obstacles.add_line(
@@ -149,28 +152,42 @@ def _finite(total: float) -> float:
     return total if math.isfinite(total) else 0.0
 
 
-def _drawn(left: Sequence[Pathway], hubs: Mapping[int, Hub], picture: Rect) -> list[Bundle]:
+def _drawn(left: Sequence[Pathway], hubs: Mapping[int, Hub], ground: Ground) -> list[Bundle]:
     """The bundles, the widest first, so that none hides another."""
-    widest, most = _WIDEST * min(1.0, (_CROWD / len(left)) ** 0.25), largest(left)
-    routes: list[FloatArray] = []
-    reaches: list[tuple[float, float]] = []
-    widths: list[float] = []
-    for one in left:
-        own = [_width(strand, most, widest) for strand in one.strands]
-        a, b = hubs[one.source], hubs[one.target]
-        rims = _rims(a, b)
-        aside = -(sum(own) + _BESIDE * (len(own) - 1)) / 2
-        for place, width in enumerate(own):
-            if one.source == one.target:
-                routes.append(_loop(a, picture, 1.0 + 0.35 * place))
-            else:
-                routes.append(_arc(a, b, aside + width / 2))
-            aside += width + _BESIDE
-            reaches.append(rims)
-        widths += own
-    lines = iter(zip(trimmed(routes, np.array(reaches), _USUAL), widths, strict=True))
-    result = [Bundle(one, tuple(Band(strand, *next(lines)) for strand in one.strands)) for one in left]
+    lone = [is_lone(ground.network, one) for one in left]
+    widest, most = _WIDEST * min(1.0, (_CROWD / max(lone.count(False), 1)) ** 0.25), largest(left)
+    result = list[Bundle]()
+    for alone, usual in ((False, _USUAL), (True, float(ground.radii.min(initial=_USUAL)))):
+        some = [one for one, by_itself in zip(left, lone, strict=True) if by_itself is alone]
+        widths = [[_THIN if alone else _width(strand, most, widest) for strand in one.strands] for one in some]
+        routes = [
+            _routes(hubs[one.source], hubs[one.target], own, 0.0 if alone else _BEND, ground.picture)
+            for one, own in zip(some, widths, strict=True)
+        ]
+        rims = [_rims(hubs[one.source], hubs[one.target]) for one in some for _ in one.strands]
+        lines = iter(trimmed([route for own in routes for route in own], np.array(rims).reshape(-1, 2), usual))
+        for one, own in zip(some, widths, strict=True):
+            bands = tuple(Band(strand, next(lines), width) for strand, width in zip(one.strands, own, strict=True))
+            result.append(Bundle(one, bands, alone))
     return sorted(result, key=lambda one: -max(band.width for band in one.bands))
+
+
+def is_lone(network: Network, one: Pathway) -> bool:
+    """Whether a pathway is that of one neuron to another, of which nothing is added up."""
+    groups = network.neurons.groups
+    single = groups[one.source].count == groups[one.target].count == 1
+    return single and one.count == len(one.members) == 1
+
+
+def _routes(a: Hub, b: Hub, widths: Sequence[float], bend: float, picture: Rect) -> list[FloatArray]:
+    """How bands of these widths run from hub to hub, beside each other."""
+    if a is b:
+        return [_loop(a, picture, 1.0 + 0.35 * place) for place in range(len(widths))]
+    aside, result = -(sum(widths) + _BESIDE * (len(widths) - 1)) / 2, list[FloatArray]()
+    for width in widths:
+        result.append(_arc(a, b, bend, aside + width / 2))
+        aside += width + _BESIDE
+    return result
 
 
 def _width(strand: Strand, most: float, widest: float) -> float:
@@ -191,15 +208,16 @@ def _rims(a: Hub, b: Hub) -> tuple[float, float]:
     return fewer * rims[0], fewer * rims[1]
 
 
-def _arc(a: Hub, b: Hub, aside: float) -> FloatArray:
-    """From hub to hub, bent to the right, and moved aside by so much."""
+def _arc(a: Hub, b: Hub, bend: float, aside: float) -> FloatArray:
+    """From hub to hub, bent to the right by a share of its length, and moved aside by so much."""
     start, end = np.array(a.centre), np.array(b.centre)
     along = end - start
     right = np.array([-along[1], along[0]])
     far = float(np.hypot(*along))
     off = right / far * aside if far > 0 else np.zeros(2)
-    bend = _BEND * right
-    return np.array([start + off, start + along / 3 + bend + off, start + along * 2 / 3 + bend + off, end + off])
+    off = off + bend * right * np.array([[0.0], [1.0], [1.0], [0.0]])
+    result: FloatArray = np.stack([start, start + along / 3, start + along * 2 / 3, end]) + off
+    return result
 
 
 def _loop(hub: Hub, picture: Rect, larger: float) -> FloatArray:
@@ -211,16 +229,17 @@ def _loop(hub: Hub, picture: Rect, larger: float) -> FloatArray:
     return np.array([hub.centre, *inner, hub.centre])
 
 
-def ink(theme: Theme, end: int) -> str:
+def ink(theme: Theme, end: int, lone: bool = False) -> str:
     """The colour of bands that excite (1), inhibit (−1), or do neither (0), so pale that none is taken for a signal."""
-    return mixed(theme.background, {1: theme.positive, -1: theme.negative, 0: theme.zero}[end], _SHARE)
+    colour = {1: theme.positive, -1: theme.negative, 0: theme.zero}[end]
+    return mixed(theme.background, colour, _LONE_SHARE if lone else _SHARE)
 
 
 def drawn(network: Network, bundle: Bundle, theme: Theme, step: int) -> Group:
     """A bundle as a group of a scene; its sums are those of a step."""
     one, shapes = bundle.pathway, list[Shape]()
     for band in bundle.bands:
-        colour, end = ink(theme, band.strand.end), band.strand.end if theme.ends == "signs" else 1
+        colour, end = ink(theme, band.strand.end, bundle.lone), band.strand.end if theme.ends == "signs" else 1
         shapes += [Spline(band.line.points, colour, band.width), ended(band.line.end, band.width, colour, end)]
     name = one.name(network)
     data = {"class": "bundle", "pathway": name, "count": str(one.count), "sum": f"{one.total:.12g}"}
@@ -241,13 +260,15 @@ def _said(name: str, one: Pathway, step: int) -> str:
 
 
 class Told(NamedTuple):
-    """What a legend says of bundles: what they do, in the order of strands; the largest sum of a band."""
+    """What a legend says of bundles: what they do, in the order of strands; the largest sum of a band, None where all
+    of them are lone."""
 
     ends: tuple[int, ...]
-    largest: float
+    largest: float | None
 
 
-def told(left: Sequence[Pathway]) -> Told | None:
+def told(network: Network, left: Sequence[Pathway]) -> Told | None:
     """What a legend says of the bundles of these pathways, None without any."""
     ends = {strand.end for one in left for strand in one.strands}
-    return Told(tuple(end for end in SAID if end in ends), largest(left)) if left else None
+    lone = all(is_lone(network, one) for one in left)
+    return Told(tuple(end for end in SAID if end in ends), None if lone else largest(left)) if left else None

@@ -216,16 +216,17 @@ def _room(word: float) -> float:
 
 def _bundle(told: Told, theme: Theme) -> LegendEntry:
     """Bands as they excite and inhibit, and what the widest stands for."""
-    words = f"left out, added up: |Σ w| up to {texts.number(told.largest)}"
+    lone, width = told.largest is None, 1.0 if told.largest is None else 5.0
+    words = "left out" if told.largest is None else f"left out, added up: |Σ w| up to {texts.number(told.largest)}"
     wide = [_room(texts.width(bundles.SAID[end], SMALL)) for end in told.ends]
     across = max(sum(wide) + (len(wide) - 1) * _STROKE_GAP, texts.width(words, SMALL))
     shapes: list[Shape] = [heading("Bundle", theme)]
     x = 0.0
     for end, room in zip(told.ends, wide, strict=True):
-        colour = bundles.ink(theme, end)
+        colour = bundles.ink(theme, end, lone)
         tip = Arrowhead((x + _STROKE, SAMPLE_Y), (1.0, 0.0), _HEAD, 0.0, "")
-        tip = ended(tip, 5.0, colour, end if theme.ends == "signs" else 1)
-        shapes += [stroke(x, tip.notch[0] - x, colour, 5.0), tip]
+        tip = ended(tip, width, colour, end if theme.ends == "signs" else 1)
+        shapes += [stroke(x, tip.notch[0] - x, colour, width), tip]
         shapes.append(Text((x, FIRST_Y), bundles.SAID[end], SMALL, theme.muted))
         x += room + _STROKE_GAP
     shapes.append(Text((0, SECOND_Y), words, SMALL, theme.muted))

@@ -153,6 +153,7 @@ def plan(
     page = _on_page(content, framed, gains, layout, theme)
     said = _texts(content, page, settings)
     rings = np.minimum(2.5, 0.12 * page.radii)
+    lone, joined = _bundle_groups(network, page.bundles, theme, 0 if begin is None else begin.step)
     made = Plan(
         network=network,
         gains=gains,
@@ -170,11 +171,8 @@ def plan(
         beads=delays.beads(network, page.lines, RADIUS * frame.scale, theme),
         lesions=content.lesions,
         labels=tuple(raised(said.labels, content.sizes)),
-        back=(*_box_frames(page.boxes, frame, theme), *_dotted_groups(content, page, theme, many=False)),
-        between=(
-            *_bundle_groups(network, page.bundles, theme, 0 if begin is None else begin.step),
-            *_dotted_groups(content, page, theme, many=True),
-        ),
+        back=(*_box_frames(page.boxes, frame, theme), *lone, *_dotted_groups(content, page, theme, many=False)),
+        between=(*joined, *_dotted_groups(content, page, theme, many=True)),
         front=(*_in_front(content, page, said), *framed.around(content.notes, theme)),
         captioned=None if framed.title is None else lowered(framed.title, frame.width),
         unit=1.0,
@@ -591,7 +589,7 @@ def _explained(wanted: _Wanted, gains: Gains, delayed: str, room: tuple[float, f
         unit=network.dt_unit,
         seen="" if content.near is None else called(network.layout.view),
         pathways=bool(content.said) and wanted.settings.labels,
-        bundles=bundles.told(content.left),
+        bundles=bundles.told(content.network, content.left),
     )
     for brief in (False, True):
         items = legend.entries(contents, gains, wanted.theme, brief=brief)
@@ -708,9 +706,12 @@ def _titled_groups(network: Network, boxes: Sequence[Box]) -> frozenset[str]:
     return frozenset(group.name for group in network.neurons.groups if tuple(group.indices) in held)
 
 
-def _bundle_groups(network: Network, left: bundles.Bundles, theme: Theme, step: int) -> tuple[Group, ...]:
-    names = (Group(left.names, id="hubs"),) if left.names else ()
-    return (*(bundles.drawn(network, one, theme, step) for one in left.all), *names)
+def _bundle_groups(network: Network, left: bundles.Bundles, theme: Theme, step: int) -> tuple[list[Group], list[Group]]:
+    """Bundles beneath the lines, and above these, with the names of hubs."""
+    lone, joined = (
+        [bundles.drawn(network, one, theme, step) for one in left.all if one.lone is alone] for alone in (True, False)
+    )
+    return lone, [*joined, *([Group(left.names, id="hubs")] if left.names else [])]
 
 
 def _dotted_groups(content: _Content, page: _OnPage, theme: Theme, *, many: bool) -> list[Group]:
