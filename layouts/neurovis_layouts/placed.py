@@ -10,7 +10,7 @@ the grid.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from neurovis_layouts.formations import offsets
@@ -110,6 +110,15 @@ def _placed(problem: LayoutProblem, engine: str, how: Arrangement, spacing: floa
     return layout if around else sided(problem, layout)
 
 
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """Neurons that are drawn as a whole: those of an instance, by its number, or in none (−1)."""
+
+    number: int
+    members: Sequence[int]
+    drawing: Drawing
+
+
 class Blocks:
     """Draws a problem; each make of instance once."""
 
@@ -147,38 +156,30 @@ class Blocks:
     ) -> Drawing:
         """What is in an instance (−1: in none), its outermost instances as blocks; pins are relative to its origin."""
         place = {member: i for i, member in enumerate(members)}
-        within = self._within.get(number, [])
-        framed = {m for inner in within for m in self._problem.modules[inner].members}
-        loose = [m for m in members if m not in framed]
-        blocks: list[tuple[Sequence[int], Drawing]] = [
-            (self._problem.modules[inner].members, self._instance(inner)) for inner in within
-        ]
-        if loose:
-            blocks.insert(0, (loose, self.formed(loose)))
-        rects = [drawing.rect() for _, drawing in blocks]
+        blocks = self._blocks(number, members)
+        rects = [block.drawing.rect() for block in blocks]
         corners = packed([(r[2] - r[0], r[3] - r[1]) for r in rects], _BETWEEN) if blocks else []
+        shifts = [(snap(x - r[0]), snap(y - r[1])) for (x, y), r in zip(corners, rects, strict=True)]
         free: list[Point] = [(0.0, 0.0)] * len(members)
         sides: list[Side | None] = [None] * len(members)
-        shifts = [(snap(x - r[0]), snap(y - r[1])) for (x, y), r in zip(corners, rects, strict=True)]
-        for (own, drawing), shift in zip(blocks, shifts, strict=True):
-            for member, point, side in zip(own, drawing.places, drawing.sides, strict=True):
+        for block, shift in zip(blocks, shifts, strict=True):
+            for member, point, side in zip(block.members, block.drawing.places, block.drawing.sides, strict=True):
                 free[place[member]] = _moved(point, shift)
                 sides[place[member]] = side
         places, whole, bent = fit(free, {place[m]: point for m, point in pins.items()})
         routes: dict[Key, Route] = {}
         frames: list[tuple[tuple[int, ...], Rect]] = []
-        kinds = [*((-1,) if loose else ()), *within]
-        for inner, (own, drawing), shift in zip(kinds, blocks, shifts, strict=True):
-            here = [place[m] for m in own]
+        for block, shift, rect in zip(blocks, shifts, rects, strict=True):
+            here = [place[m] for m in block.members]
             if bent.intersection(here):
-                routes.update(self._bent(inner, here, places))
+                routes.update(self._bent(block.number, here, places))
                 continue
-            (sx, sy), rect = (shift[0] + whole[0], shift[1] + whole[1]), drawing.rect()
-            for (a, b, k), route in drawing.routes.items():
-                routes[here[a], here[b], k] = tuple((x + sx, y + sy) for x, y in route)
-            around = [] if inner < 0 else [(tuple(range(len(own))), rect)]
+            by = _moved(shift, whole)
+            for (a, b, k), route in block.drawing.routes.items():
+                routes[here[a], here[b], k] = tuple(_moved(point, by) for point in route)
+            around = [] if block.number < 0 else [(tuple(range(len(here))), rect)]
             frames += [
-                (tuple(here[m] for m in inside), shifted(r, (sx, sy))) for inside, r in (*around, *drawing.frames)
+                (tuple(here[m] for m in inside), shifted(r, by)) for inside, r in (*around, *block.drawing.frames)
             ]
         local = [replace(e, source=place[e.source], target=place[e.target]) for e in edges]
         title = self._titles[number] if number >= 0 else 0.0
@@ -186,6 +187,14 @@ class Blocks:
         return routed(
             Drawing(tuple(places), routes, tuple(frames), sides=tuple(sides), labels=labels, title=title), local
         )
+
+    def _blocks(self, number: int, members: Sequence[int]) -> list[_Block]:
+        """What is placed as a whole in an instance: its neurons outside of others, and the outermost of these."""
+        within = self._within.get(number, [])
+        framed = {m for inner in within for m in self._problem.modules[inner].members}
+        loose = [m for m in members if m not in framed]
+        blocks = [_Block(inner, self._problem.modules[inner].members, self._instance(inner)) for inner in within]
+        return [_Block(-1, loose, self.formed(loose)), *blocks] if loose else blocks
 
     def formed(self, neurons: Sequence[int]) -> Drawing:
         """Neurons in their formation."""
