@@ -304,15 +304,38 @@ def with_exits(
 ) -> tuple[dict[int, list[Waypoint]], set[int]]:
     """The waypoints of each edge, from above to below, those at the exits among them, and which edges need no others
     to pass all frames."""
-    levels, places, spans = ranks.levels, ranks.places, ranks.spans
-    folds, uneven = ranks.folds, ranks.uneven
+    levels, places, uneven = ranks.levels, ranks.places, ranks.uneven
     found = {i: list(line) for i, line in ways.items()}
-    if not folds.slots and not uneven:
+    if not ranks.folds.slots and not uneven:
         return found, set()
-    whole: set[int] = set()
     node = {m: n for n, each in enumerate(levels.nodes) for m, _, _ in each.members}
-    rank = {m: levels.nodes[n].rank for m, n in node.items()}
+    leaving, whole = _leaving(problem, edges, ranks, node, ways)
+    for (end, down), lines in sorted(leaving.items()):
+        n = node[end]
+        rank = levels.nodes[n].rank
+        before, behind = ranks.spans[rank]
+        beyond, apart = (_BEYOND, min(_APART, _FREE / max(1, len(lines) - 1))) if rank in uneven else (0.0, _APART)
+        y = places[n][1] - levels.nodes[n].lift + (behind + beyond if down else -before - beyond)
+        middle = _at(levels, places, n, end)
+        for place, (_, i) in enumerate(sorted(lines)):
+            gate = Waypoint(middle + (place - (len(lines) - 1) / 2) * apart, y)
+            found[i] = [gate, *found.get(i, [])] if down else [*found.get(i, []), gate]
+    return found, whole
+
+
+def _leaving(
+    problem: LayoutProblem,
+    edges: Sequence[int],
+    ranks: PlacedRanks,
+    node: Mapping[int, int],
+    ways: Mapping[int, list[Waypoint]],
+) -> tuple[dict[tuple[int, bool], list[tuple[float, int]]], set[int]]:
+    """The edges that get a waypoint at the edge of a rank, with where across they go, by their neuron there and whether
+    they lead down; and those that need no others then. ``node`` is that of each neuron."""
+    levels, folds, uneven = ranks.levels, ranks.folds, ranks.uneven
     leaving: dict[tuple[int, bool], list[tuple[float, int]]] = {}
+    whole: set[int] = set()
+    rank = {m: levels.nodes[n].rank for m, n in node.items()}
     for i in edges:
         ends = sorted((problem.edges[i].source, problem.edges[i].target), key=lambda m: rank[m])
         line = [way.x for way in ways.get(i, ())]
@@ -322,24 +345,15 @@ def with_exits(
                 continue
             if end not in folds.slots and rank[end] not in uneven:
                 # beside what is high a flat line would run through that
-                clear = clear and max(spans[rank[end]]) < _LOW
+                clear = clear and max(ranks.spans[rank[end]]) < _LOW
             elif rank[end] in uneven or _open(levels, node[end], end, down):
-                towards = [*(line if down else line[::-1]), _at(levels, places, node[other], other)][0]
+                towards = [*(line if down else line[::-1]), _at(levels, ranks.places, node[other], other)][0]
                 leaving.setdefault((end, down), []).append((towards, i))
             else:
                 clear = False
         if clear and uneven.isdisjoint((rank[ends[0]], rank[ends[1]])):
             whole.add(i)
-    for (end, down), lines in sorted(leaving.items()):
-        n = node[end]
-        before, behind = spans[rank[end]]
-        beyond, apart = (_BEYOND, min(_APART, _FREE / max(1, len(lines) - 1))) if rank[end] in uneven else (0.0, _APART)
-        y = places[n][1] - levels.nodes[n].lift + (behind + beyond if down else -before - beyond)
-        middle = _at(levels, places, n, end)
-        for place, (_, i) in enumerate(sorted(lines)):
-            gate = Waypoint(middle + (place - (len(lines) - 1) / 2) * apart, y)
-            found[i] = [gate, *found.get(i, [])] if down else [*found.get(i, []), gate]
-    return found, whole
+    return leaving, whole
 
 
 def _at(levels: Levels, places: Sequence[Point], node: int, member: int) -> float:
