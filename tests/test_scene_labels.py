@@ -24,7 +24,7 @@ LONG = "a very long label that goes on for forty"
 SPEC = f"""
 neurovis: 1
 name: labels
-neurons: {{A: {{count: 3, label: "{LONG}", bias: 1}}, B: {{count: 12}}}}
+neurons: {{A: {{count: 3, label: ["{LONG} a", "{LONG} b", "{LONG} c"], bias: 1}}, B: {{count: 12}}}}
 connections: {{A -> B: {{pattern: all_to_all}}}}
 """
 
@@ -33,12 +33,27 @@ def test_every_neuron_of_a_row_has_a_label_shortened_where_there_is_no_room_for_
     network = nv.compile_text(SPEC)
     scene = scene_of(network, network.run(3).snapshot(2))
     texts = {group.data.get("neuron"): [s.text for s in group.shapes if isinstance(s, Text)] for group in scene.groups}
-    said = [text for name in ("A1", "A2", "A3") for text in texts[name]]
-    assert len(said) == 3
-    for text in said:
-        assert text == LONG or (text.endswith("…") and LONG.startswith(text[:-1].rstrip()))
+    for name, letter in (("A1", "a"), ("A2", "b"), ("A3", "c")):
+        text = " ".join(texts[name])
+        assert text == f"{LONG} {letter}" or (text.endswith("…") and LONG.startswith(text[:-1].rstrip()))
         assert len(text) >= 8
     assert all(LONG in group.title for group in scene.groups if group.data.get("neuron") in ("A1", "A2", "A3"))
+
+
+def test_what_all_neurons_of_a_group_are_called_is_said_once() -> None:
+    spec = SPEC.replace(f'["{LONG} a", "{LONG} b", "{LONG} c"]', f'"{LONG}"')
+    network = nv.compile_text(spec)
+    scene = scene_of(network, network.run(3).snapshot(2))
+    said = {g.id: [s.text for s in g.shapes if isinstance(s, Text)] for g in scene.groups}
+    assert " ".join(said["label:A"]) == LONG
+    assert [said[f"n{index}"] for index in range(3)] == [[], [], []]
+    rects = [s for g in scene.groups if g.id == "label:A" for s in g.shapes if isinstance(s, Text)]
+    discs = [s for g in scene.groups if g.data.get("neuron", "")[:1] == "A" for s in g.shapes if isinstance(s, Disc)]
+    ends = {"start": max(d.centre[0] for d in discs), "end": min(d.centre[0] for d in discs)}
+    assert all(abs(one.point[0] - ends.get(one.anchor, one.point[0])) < 2 * discs[0].radius for one in rects)
+    apart = nv.compile_text(spec + "layout: {positions: {A1: [0, 0], A2: [3, 0], A3: [6, 0], B1: [4.5, 0]}}\n")
+    scene = scene_of(apart, apart.run(1).snapshot(0))
+    assert "label:A" not in {group.id for group in scene.groups}
 
 
 @pytest.mark.parametrize(

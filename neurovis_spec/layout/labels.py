@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from neurovis_spec.compiler.network import Network, Neurons
+from neurovis_spec.compiler.network import Group, Network, Neurons
 from neurovis_spec.layout.geometry import Rect, shifted
 from neurovis_spec.layout.model import RADIUS, Point, Side
 from neurovis_spec.text_width import width, with_subscript
@@ -74,6 +74,17 @@ def told_by_number(neurons: Neurons) -> list[bool]:
     return found
 
 
+def called_alike(neurons: Neurons) -> tuple[Group, ...]:
+    """The groups of several neurons that have one label: it is said once of all of them."""
+    return tuple(
+        group
+        for group in neurons.groups
+        if group.count > 1
+        and len({neurons.labels[index] for index in group.indices}) == 1
+        and neurons.labels[group.start]
+    )
+
+
 def least_on_disc(subscript: str, radius: float) -> float:
     """The smallest size on a disc: it grows no faster than the disc, so that what fits on one fits on a larger one."""
     return max(TINY, min(NUMBERED if subscript else SMALLEST, 0.5 * radius))
@@ -92,15 +103,17 @@ def fits(parts: tuple[str, str], size: float, radius: float) -> bool:
 
 def label_room(network: Network) -> tuple[Point, ...]:
     """How wide and high each neuron's label is beside its disc; (0, 0) where the disc holds it, or at least the number
-    that says which of its group it is. Mirror images, and neurons of one name in instances of one module, take the same
-    room, that of the longest label. None at all where labels are left out, or are so long together that a picture of
-    them all is too small for them."""
+    that says which of its group it is, and where it is that of the whole group. Mirror images, and neurons of one name
+    in instances of one module, take the same room, that of the longest label. None at all where labels are left out, or
+    are so long together that a picture of them all is too small for them."""
     neurons, none = network.neurons, (0.0, 0.0)
     radius = RADIUS * UNIT
     beside = [
         not told and not fits(both, least_on_disc(both[1], radius), radius)
         for both, told in zip(parts_of(neurons), told_by_number(neurons), strict=True)
     ]
+    for group in called_alike(neurons):
+        beside[group.start : group.start + group.count] = [False] * group.count
     if not network.render.labels or not any(beside):
         return ()
     wide = [

@@ -17,9 +17,11 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.layout.geometry import Cells, Rect
+from neurovis_spec.layout.geometry import Cells, Rect, united
 from neurovis_spec.layout.labels import (
+    ABOVE,
     ASIDE,
+    BELOW,
     BESIDE,
     DROP,
     LINE,
@@ -41,7 +43,7 @@ from neurovis_spec.layout.labels import (
 from neurovis_spec.layout.model import RADIUS, Point, Side
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.beside import placed
-from neurovis_spec.scene.model import Text
+from neurovis_spec.scene.model import Text, Theme
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.spots import Field, Slot, Wanted
 from neurovis_spec.scene.texts import Cut
@@ -60,6 +62,8 @@ _SMALLEST_DISC = 7.0
 _SMALLEST_NUMBERED = 16.0
 #: to how much of its width a name is cut beside its disc, if there is no room for it, and how many letters it keeps
 _CUT, _LETTERS = (0.75, 0.5), 3
+#: What lies on more than this is left out.
+_TOO_MUCH = 10_000
 #: In how many lines a long name is at most.
 _LINES = 3
 #: How much the label of a glyph moves up, for the number beneath it, in its sizes.
@@ -203,6 +207,28 @@ def _until(
         for index in counted:
             until[index] = latest
     return until
+
+
+def beside_all(label: str, rect: Rect, obstacles: Obstacles, picture: Rect, theme: Theme) -> tuple[Text, ...]:
+    """What all neurons in a part of the ``picture`` are called, in lines, at an end of it, above or below, where it
+    covers least, and no disc; nothing where there is no room. Its own room is added to ``obstacles``."""
+    (x0, y0, x1, y1), size, said = rect, BESIDE, _in_lines(label, "")
+    wide, high = _wide(said, size), (RISE + DROP + LINE * (len(said[0]) - 1)) * size
+    across, down = (x0 + x1 - wide) / 2, (y0 + y1 - high) / 2
+    corners = ((x0 - ASIDE - wide, down), (x1 + ASIDE, down), (across, y0 - ABOVE - high), (across, y1 + BELOW))
+    rects = [(x - 2, y, x + wide + 2, y + high) for x, y in corners]
+    inside = [own for own in rects if united((own, picture)) == picture]
+    if not inside:
+        return ()
+    hits, place = min((obstacles.hits(own), place) for place, own in enumerate(inside))
+    if hits >= _TOO_MUCH:
+        return ()
+    obstacles.add_text(inside[place])
+    (first, *below), (left, top, right, _) = said[0], inside[place]
+    anchor: Literal["start", "middle", "end"] = "end" if right <= x0 else "start" if left >= x1 else "middle"
+    start = {"start": left + 2, "middle": (left + right) / 2, "end": right - 2}[anchor]
+    point = start, top + RISE * size
+    return Label(first, "", size, point, anchor, False, hits > 0, tuple(below)).shapes(theme.ink, theme.background)
 
 
 def raised(labels: Sequence[Label | None], sizes: Mapping[int, int]) -> list[Label | None]:

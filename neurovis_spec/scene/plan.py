@@ -18,7 +18,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
-from neurovis_spec.layout.labels import BESIDE, UNIT, label_rects, label_room
+from neurovis_spec.layout.labels import BESIDE, UNIT, called_alike, label_rects, label_room
 from neurovis_spec.layout.model import RADIUS, Layout, Point, Side
 from neurovis_spec.layout.naming import natural_key
 from neurovis_spec.projection import called, nearness
@@ -44,6 +44,7 @@ from neurovis_spec.scene.geometry import batches, bounds, samples
 from neurovis_spec.scene.labels import (
     Ground,
     Label,
+    beside_all,
     labels_of,
     margin_beside,
     partners_of,
@@ -316,10 +317,12 @@ def _on_page(content: _Content, framed: _Framed, gains: Gains, layout: Layout, t
 
 @dataclass(frozen=True, slots=True)
 class _Texts:
-    """Titles by box, labels of neurons, and by entry those of connections."""
+    """Titles by box, labels of neurons, by group what all of its neurons are called, and by entry what connections
+    are."""
 
     titles: Mapping[int, Text]
     labels: Sequence[Label | None]
+    groups: Mapping[str, tuple[Text, ...]]
     lines: Mapping[str, Text]
 
 
@@ -333,9 +336,14 @@ def _texts(content: _Content, page: _OnPage, settings: RenderSettings) -> _Texts
     found = in_one_place([titled[index] for index in framed], obstacles, theme, kept)
     titles = {framed[place]: text for place, text in found.items()}
     labels: list[Label | None] = [None] * len(network.neurons)
+    groups: Mapping[str, tuple[Text, ...]] = {}
     lines: Mapping[str, Text] = {}
     if settings.labels:
+        groups = _called_together(content, page, theme)
         hidden = (~content.seen.focus).tolist()
+        for name in groups:
+            for index in network.group_index[name].indices:
+                hidden[index] = True
         labels = labels_of(network, _ground(content, page), obstacles, hidden, content.sizes, content.sides)
         if content.said:
             strongest = np.argsort(-np.abs(network.connections.weights.whole()), kind="stable").tolist()
@@ -347,11 +355,29 @@ def _texts(content: _Content, page: _OnPage, settings: RenderSettings) -> _Texts
     unsaid = {titled[index].computes for index, text in titles.items() if text.text != boxes[index].title}
     others = elsewhere([titled[index] for index in left], obstacles, theme, unsaid)
     titles |= {index: text for index, text in zip(left, others, strict=True) if text is not None}
-    return _Texts(titles, labels, lines)
+    return _Texts(titles, labels, groups, lines)
+
+
+def _called_together(content: _Content, page: _OnPage, theme: Theme) -> dict[str, tuple[Text, ...]]:
+    """By group what all of its neurons are called, once beside them all: of those that stand together, where there is
+    room for it."""
+    neurons, found = content.network.neurons, dict[str, tuple[Text, ...]]()
+    for group in called_alike(neurons):
+        own = np.array(group.indices, np.int64)
+        low, high = page.centres[own].min(axis=0), page.centres[own].max(axis=0)
+        within = ((page.centres >= low) & (page.centres <= high)).all(axis=1)
+        if content.seen.focus[own].all() and int(within.sum()) == group.count:
+            reach = float(page.radii[own].max())
+            (x0, y0), (x1, y1) = (low - reach).tolist(), (high + reach).tolist()
+            label = neurons.labels[group.start]
+            found[group.name] = beside_all(label, (x0, y0, x1, y1), page.obstacles, page.picture, theme)
+    return {name: lines for name, lines in found.items() if lines}
 
 
 def _in_front(content: _Content, page: _OnPage, said: _Texts) -> Iterator[Group]:
-    """The labels of connections, and the titles."""
+    """The labels of connections and of groups, and the titles."""
+    for name, words in said.groups.items():
+        yield Group(words, id=f"label:{name}")
     for entry, text in said.lines.items():
         yield Group(backed(text) if content.said else (text,), id=f"label:{entry}")
     for index in sorted(said.titles):
