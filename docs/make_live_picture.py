@@ -20,25 +20,46 @@ from chromium import Page, chromium  # noqa: E402
 
 SPEC, TARGET = HERE.parent / "specs" / "cpg_rbf.yaml", HERE / "pictures" / "live.webp"
 SIZE = (900, 760)
-#: Steps between two pictures, and how long each is seen, in milliseconds.
-STEPS, SEEN = 3, 80
+#: Steps between two pictures, and how long each is seen, in milliseconds; how long the last is.
+STEPS, SEEN, LAST = 16, 90, 2500
+#: Where it is played to, and from where on it goes otherwise.
+END, BACK = 640, 300
 STEP = "Number(document.querySelector('#told')?.textContent.split(' ')[1])"
 
 
-async def pictures(page: Page, count: int) -> list[Image.Image]:
-    """So many pictures, some steps apart."""
+async def picture(page: Page) -> Image.Image:
+    """What is seen, with the curves of all steps."""
+    await page.ask("new Promise((done) => setTimeout(done, 120))")
+    return Image.open(io.BytesIO(await page.shot())).convert("RGB")
+
+
+async def played(page: Page, end: int) -> list[Image.Image]:
+    """Pictures some steps apart, until a step."""
     taken = []
-    for _ in range(count):
+    while True:
+        before = await page.ask(STEP)
+        assert isinstance(before, int | float)
+        if before >= end:
+            return taken
         for _ in range(STEPS):
-            before = await page.ask(STEP)
             await page.key("ArrowRight")
-            await page.until(f"{STEP} > {before}")
-        taken.append(Image.open(io.BytesIO(await page.shot())).convert("RGB"))
+        await page.until(f"{STEP} >= {before + STEPS}")
+        taken.append(await picture(page))
+
+
+async def dragged(page: Page, start: int, end: int) -> list[Image.Image]:
+    """Pictures of how the thumb is dragged back."""
+    taken = []
+    for step in range(start, end - 1, -34):
+        await page.ask(f"scrub = document.querySelector('#scrub'); scrub.value = {step}")
+        await page.ask("scrub.dispatchEvent(new Event('input'))")
+        await page.until(f"{STEP} == {step}")
+        taken.append(await picture(page))
     return taken
 
 
 async def film() -> list[Image.Image]:
-    """The page as it is played, held, and turned."""
+    """O chases T and the error falls; back, K2 is lesioned, and the new curve runs over the pale old one."""
     live = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "neurovis_spec", "live", str(SPEC)), stdout=asyncio.subprocess.PIPE
     )
@@ -49,14 +70,23 @@ async def film() -> list[Image.Image]:
             async with chromium(Path(folder)) as page:
                 await page.size(*SIZE)
                 await page.call("Page.navigate", url=url)
-                await page.until(f"{STEP} >= 60")
+                await page.until(f"{STEP} >= 0")
                 await page.key(" ")
-                taken = await pictures(page, 25)
+                await page.key("Home")
+                await page.until(f"{STEP} == 0")
+                taken = await played(page, END)
+                taken += await dragged(page, END, BACK)
                 for _ in range(4):
                     await page.key("]")
-                taken += await pictures(page, 35)
+                await page.key("t")
+                taken += [await picture(page)] * 6
+                await page.ask("document.querySelector('#lesion').click()")
+                await page.until("document.querySelector('#others').children.length > 0")
+                await page.key("t")
+                taken += [await picture(page)] * 3
                 await page.key("Escape")
-                taken += await pictures(page, 10)
+                await page.ask("document.activeElement.blur()")
+                taken += await played(page, END)
                 assert page.errors == []
                 return taken
     finally:
@@ -67,7 +97,8 @@ async def film() -> list[Image.Image]:
 def main() -> None:
     """Write the film."""
     first, *rest = asyncio.run(film())
-    first.save(TARGET, save_all=True, append_images=rest, duration=SEEN, loop=0, quality=70, method=6)
+    durations = [SEEN] * len(rest) + [LAST]
+    first.save(TARGET, save_all=True, append_images=rest, duration=durations, loop=0, quality=60, method=6)
     print(f"{TARGET.name}: {1 + len(rest)} pictures, {TARGET.stat().st_size / 1024:.0f} KiB")
 
 
