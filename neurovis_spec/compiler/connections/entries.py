@@ -179,6 +179,20 @@ class _Shape(NamedTuple):
         return _Shape(self.i[kept], self.j[kept], weights, delays, parts, columns, copy)
 
 
+class _Read(NamedTuple):
+    """What the body of an entry says, all of it valid; ``delays`` are None where it says none."""
+
+    shape: _Shape
+    route: Route
+    rules: tuple[Learning, ...]
+    synapse: Settled | None
+    weights: FloatArray
+    centres: FloatArray
+    bounds: tuple[float, float]
+    delays: Delays | Unknown | None
+    labels: Texts | None
+
+
 class EntryContext(NamedTuple):
     """Where an entry stands: its scope, what is called how there, how many connections it may make."""
 
@@ -257,13 +271,7 @@ class EntryBuilder:
         # what is collected here stands at cells of the matrix, what ``centre_parts`` collects at connections
         with self.constants.following() as centre_cell_parts:
             centre = self._grid(body.centre, "centre") if isinstance(body.centre, (MatrixRows, FileReference)) else None
-        shape = self._shape(centre)
-        if self.symmetric:
-            shape = self._once(shape)
-        if shape is not UNKNOWN and findings.errors == errors_before_shape and not len(shape.i):
-            self._report_empty()
-        if findings.errors > errors_before_shape or (shape is not UNKNOWN and not self._fits(len(shape.i))):
-            shape = UNKNOWN
+        shape = self._fitting(self._shape(centre), errors_before_shape)
         written = self._written_delays(shape)
         with self.constants.following() as weight_parts:
             weights = self._weights(shape)
@@ -275,43 +283,46 @@ class EntryBuilder:
         rules, synapse, labels = self._rules(shape), self._synapse(shape), self._labels(shape)
         if shape is UNKNOWN or weights is UNKNOWN or centres is UNKNOWN or bounds is UNKNOWN:
             return UNKNOWN
-        if rules is UNKNOWN or synapse is UNKNOWN or labels is UNKNOWN:
+        if route is UNKNOWN or rules is UNKNOWN or synapse is UNKNOWN or labels is UNKNOWN:
             return UNKNOWN
-        if (
-            self.sources is UNKNOWN
-            or self.targets is UNKNOWN
-            or route is UNKNOWN
-            or not body.sound
-            or findings.errors > errors_before_entry
-        ):
+        if not body.sound or findings.errors > errors_before_entry:
+            return UNKNOWN
+        read = _Read(shape, route, rules, synapse, weights, centres, bounds, written, labels)
+        return self._bundle(read, (weight_parts, centre_parts, bound_parts))
+
+    def _fitting(self, shape: _Shape | Unknown, errors_before: int) -> _Shape | Unknown:
+        """The shape, of a symmetric entry each pair once; UNKNOWN where anything was invalid, or there is no room."""
+        if self.symmetric:
+            shape = self._once(shape)
+        if shape is UNKNOWN or self.constants.findings.errors > errors_before:
+            return UNKNOWN
+        if not len(shape.i):
+            self._report_empty()
+        fits = self.constants.findings.errors == errors_before and self._fits(len(shape.i))
+        return shape if fits else UNKNOWN
+
+    def _bundle(self, read: _Read, parts: tuple[list[Part], list[Part], list[Part]]) -> Bundle | Unknown:
+        """The bundle of what was read, of whose weights, centres and bounds these ``parts`` follow parameters."""
+        shape, body = read.shape, self.body
+        if self.sources is UNKNOWN or self.targets is UNKNOWN:
             return UNKNOWN
         sources, targets = self.sources[shape.i], self.targets[shape.j]
-        made = None if synapse is None else synapse.definition
-        unsaid = self._default_delays(sources, targets, route, made)
-        delays = _delays(shape, written, unsaid)
-        models = self.context.census.models
-        into_flow = models.into_flow(targets, route) | (made is not None and bool(made.flows))
-        if self.symmetric:
-            into_flow = into_flow | models.into_flow(sources, route)
-        check_below_step(delays, into_flow, self.constants)
-        if models.fires:
-            pairs = models.pairs(sources, targets) + (models.pairs(targets, sources) if self.symmetric else [])
-            check = SpikeCheck(route, made, rules, pairs, models, self.key.span, findings)
-            check.check(undelayed=bool((delays.steps == 0).any()))
-        if not len(shape.i):  # without connections there is nothing that they would do
-            rules, synapse = (), None
+        delays, unsaid = self._settled_delays(read, sources, targets)
+        # without connections there is nothing that rules and synapses would do
+        rules, synapse = (read.rules, read.synapse) if len(shape.i) else ((), None)
         learns = {name: any(one.rule.given.name == name for one in rules) for name in ("weight", "centre")}
         learns["weight"] |= shape.tied is not None and shape.tied.original.learns
+        weight_parts, centre_parts, bound_parts = parts
         bundle = Bundle(
             name=self.context.scope.called(self.name),
             key=self.key.span,
             sources=sources,
             targets=targets,
-            weights=weights,
-            centres=centres,
+            weights=read.weights,
+            centres=read.centres,
             delays=delays.steps,
-            low=bounds[0],
-            high=bounds[1],
+            low=read.bounds[0],
+            high=read.bounds[1],
             rules=rules,
             description=None if body.description is None else body.description.value,
             ends_disjoint=body.self is not None and not np.isin(self.sources, self.targets).any(),
@@ -321,16 +332,32 @@ class EntryBuilder:
                 *bound_parts,
             ),
             label=body.label.value if isinstance(body.label, Located) else None,
-            labels=labels,
+            labels=read.labels,
             columns=shape.columns,
             empty=None if len(shape.i) else (self.sources, self.targets),
-            route=route,
-            undelayed=written is None and not np.all(np.asarray(unsaid) | shape.has_delay),
+            route=read.route,
+            undelayed=read.delays is None and not np.all(np.asarray(unsaid) | shape.has_delay),
             timing=None if delays.exact is None else delays,
             synapse=synapse,
             tied=shape.tied,
         )
         return self._in_use(bundle.twinned() if self.symmetric else bundle)
+
+    def _settled_delays(self, read: _Read, sources: Indices, targets: Indices) -> tuple[Delays, int | Indices]:
+        """The delay of every connection, and what it is where nothing says one; checked against what flows and fires
+        at both ends."""
+        made, models = None if read.synapse is None else read.synapse.definition, self.context.census.models
+        unsaid = self._default_delays(sources, targets, read.route, made)
+        delays = _delays(read.shape, read.delays, unsaid)
+        into_flow = models.into_flow(targets, read.route) | (made is not None and bool(made.flows))
+        if self.symmetric:
+            into_flow = into_flow | models.into_flow(sources, read.route)
+        check_below_step(delays, into_flow, self.constants)
+        if models.fires:
+            pairs = models.pairs(sources, targets) + (models.pairs(targets, sources) if self.symmetric else [])
+            check = SpikeCheck(read.route, made, read.rules, pairs, models, self.key.span, self.constants.findings)
+            check.check(undelayed=bool((delays.steps == 0).any()))
+        return delays, unsaid
 
     def _default_delays(
         self, sources: Indices, targets: Indices, route: Route, synapse: Definition | None
