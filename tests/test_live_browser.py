@@ -14,6 +14,7 @@ from chromium import Page, chromium
 from PIL import Image
 from renderer_conformance import similarity
 from scenes import file_of, scene_of
+from test_scene_bundles import LAYERS
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
@@ -145,8 +146,17 @@ render: {lines: {style: {column: kind}}}
 """
 
 
-@pytest.mark.parametrize("text", [JOINED, STYLED], ids=["ends", "styles"])
-def test_the_page_shows_how_lines_end_and_their_styles(text: str, tmp_path: Path) -> None:
+#: Layers of which activities stay small and weights stay, as bundles do.
+CALM = LAYERS.replace("bias: 1}", "bias: 1, activation: tanh}").replace("rate: 0.01", "rate: 0")
+CALM = CALM.replace("count: 8}", "count: 8, activation: tanh}")
+
+
+@pytest.mark.parametrize("text", [JOINED, STYLED, CALM], ids=["ends", "styles", "bundles"])
+def test_the_page_shows_how_lines_end_their_styles_and_what_stands_for_many(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, number in {"_ALL": 20, "_MOST_LINES": 20, "_LINES_EACH": 1}.items():
+        monkeypatch.setattr(f"neurovis_spec.scene.shown.{name}", number)
     (tmp_path / "joined.yaml").write_text(text)
 
     async def main() -> None:
