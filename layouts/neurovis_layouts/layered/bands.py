@@ -19,8 +19,8 @@ from neurovis_spec.layout.model import LayoutProblem, Point
 #: What a connection that is cut counts, by the square of how much longer than the mean a band is: to even out bands of
 #: five ranks by one is worth one connection.
 _CUT = 0.05
-#: Where more connections of instances would be cut than this, nobody could follow them back; in a network of many
-#: neurons without instances, which is cut where it would be too long only, all the more.
+#: Where more connections of instances would be cut than this, nobody could follow them back; in a network of
+#: groups, which is cut where it would be too long only, so many more.
 FEW, MANY_LINES = 4, 24
 #: From the line of a connection that runs between two bands to the next, and from discs to the first of them.
 _LINE, _BESIDE = 0.25, 0.8

@@ -34,9 +34,8 @@ _IN_VAIN = 2
 #: So many numbers of bands or rows are tried one by one, further ones in steps of a fifth, up to so many; and what has
 #: more neurons and connections than the last is not folded.
 _ONE_BY_ONE, _STEP, _MOST_FOLDS, _MOST = 8, 5, 40, 3000
-#: Nothing is longer than the page by this if it can be folded, whatever that costs; without instances only what has
-#: more neurons than this, as lines that run back are worth more in a smaller picture.
-_LONGEST, _MANY = 2.5, 200
+#: Nothing is longer than the page by this if it can be folded, whatever that costs.
+_LONGEST = 2.5
 
 
 #: What can be folded: the ranks of a kind of instance, or of the whole (its number, RANKS), or the rows of instances of
@@ -77,16 +76,16 @@ Drawn: TypeAlias = Callable[[LayoutProblem, Shape], Drawing]
 
 
 def may_be_folded(problem: LayoutProblem) -> bool:
-    """Whether nothing says where on the page something stands, and it is not too large to try. Without instances only a
-    page that is asked for is worth that signals run back, or a network of many neurons."""
+    """Whether nothing says where on the page something stands, and it is not too large to try. Without instances and
+    groups only a page that is asked for is worth that signals run back."""
     fixed = problem.plan or problem.pins or any(module.pins for module in problem.modules)
-    asked = problem.modules or problem.aspect is not None or many(problem)
+    asked = problem.modules or problem.aspect is not None or grouped(problem)
     return bool(asked) and not fixed and len(problem.neurons) + len(problem.edges) <= _MOST
 
 
-def many(problem: LayoutProblem) -> bool:
-    """Whether it has so many neurons that all of them can be seen on a page only where nothing of it is left empty."""
-    return len(problem.neurons) > _MANY
+def grouped(problem: LayoutProblem) -> bool:
+    """Whether neurons come in groups, so that a network that is cut can be followed by these."""
+    return 2 * len(problem.groups) <= len(problem.neurons)
 
 
 @dataclass(frozen=True, slots=True)

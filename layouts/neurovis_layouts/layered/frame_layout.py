@@ -16,7 +16,7 @@ from neurovis_layouts.alike import Move
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.label_room import roomy, sides_of
 from neurovis_layouts.layered.bands import FEW, MANY_LINES, Wanted
-from neurovis_layouts.layered.compact import RANKS, Fold, Shape, many
+from neurovis_layouts.layered.compact import RANKS, Fold, Shape, grouped
 from neurovis_layouts.layered.component_layout import ComponentLayout, RankProblem
 from neurovis_layouts.layered.components import planned
 from neurovis_layouts.layered.drawing import Piece, brought
@@ -161,7 +161,7 @@ def with_components(frame: Frame, laid_out: LayOut) -> Frame:
     problem, units, shape = frame.problem, frame.units, frame.shape
     # a ring or a line of which a box holds some alone can be in no strip of its own
     columns = {box for box in frame.columns if _whole(units, problem.boxes[box][1])}
-    few = FEW if frame.kind >= 0 or problem.modules else MANY_LINES if many(problem) else 1
+    few = FEW if frame.kind >= 0 or problem.modules else MANY_LINES if grouped(problem) else 1
     wanted = Wanted(shape.bands(frame.kind), few)
     ranks = RankProblem(
         problem,

@@ -45,7 +45,7 @@ _WIDE, _FEWEST, _PART = 2.0, 20, 0.5
 #: A layer of so many neurons that two rows would be longer than this, in spacings, stands in more.
 _LONGEST_ROW = 75.0
 #: What is wider than so many times its height after that has its ranks farther apart.
-_WIDEST = 2.4
+_WIDEST = 2.3
 
 
 def placed(
