@@ -72,7 +72,7 @@ def test_a_polygon_covers_as_much_as_it_is_large_also_where_others_lie_in_front(
     there[found.pixels] = found.shares
     seen = np.zeros(40 * 40)
     seen[page.pixels] = page.shares
-    assert seen.reshape(40, 40) == pytest.approx(there.reshape(300, 300)[100:140, 100:140], abs=1e-4)
+    assert seen.reshape(40, 40) == pytest.approx(there.reshape(300, 300)[100:140, 100:140], abs=1 / 256)
     both = coverage.polygons(np.concatenate([made, made]) - (-100, -100), (300, 300))
     assert (both.only(both.owners == 1).shares.sum()) == pytest.approx(float(found.shares.sum()), rel=1e-5)
     whole = np.flatnonzero(there == 1)

@@ -30,8 +30,8 @@ _SAMPLE = np.float32(0.5 / 3**0.5)
 _DEVIATION, _PIECE, _MOST_PIECES = 0.05, 32.0, 4096
 #: Into so many rows a pixel is cut for what covers it of a polygon.
 _SLICES = 4
-#: Points along the round corners of polygons of two corners, of three, …
-_ROUND = (13, 9, 7, 6, 5, 4, 4, 3)
+#: Points along each round corner of polygons of two corners, and of more.
+_ROUND = (13, 9)
 #: Two pieces that meet at an angle with a cosine below this form a corner.
 _CORNER = 0.9
 
@@ -436,7 +436,7 @@ def rounded(corners: FloatArray, margins: FloatArray) -> FloatArray:
     if count == 2:
         angles[:, 1] = angles[:, 0] + math.pi  # also of a point, which has no edges
     turns = around * (angles - np.roll(angles, 1, axis=1)) % (2 * math.pi)
-    steps = _ROUND[min(count - 2, len(_ROUND) - 1)]
+    steps = _ROUND[count > 2]
     ways = (angles - around * turns)[:, :, None] + (around * turns)[:, :, None] * np.linspace(0, 1, steps)
     out = np.stack([np.sin(ways), -np.cos(ways)], axis=-1) * around[:, :, None, None]
     result: FloatArray = corners[:, :, None] + margins[:, None, None, None] * out
