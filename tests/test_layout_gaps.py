@@ -63,6 +63,7 @@ def test_instances_stand_beside_those_of_their_kind() -> None:
         f"modules: {{{legs}}}\ninstances: {{a: {{module: m}}, b: {{module: m}}, c: {{module: m}}}}\n"
         "connections: {" + ", ".join(f"d{k} -> d{k + 1}: 1" for k in range(1, 6)) + ", "
         "d1 -> a.x: 1, d3 -> b.x: 1, d6 -> c.x: 1}\n"
+        "render: {size: [300, 1500]}\n"  # on which nothing has to stand in bands
     )
     layout = lay_out_problem(problem_of(compiled.network), "layered")
     assert len({layout.positions[f"{leg}.x"][1] for leg in "abc"}) == 1
