@@ -191,6 +191,7 @@ fuzz: $(VENV)/tested
 layouts: $(VENV)/tested
 	$(BIN)/python benchmarks/layout.py $(LAYOUTS_ARGS)
 	$(BIN)/python benchmarks/layout_promises.py
+	$(BIN)/python benchmarks/readability.py
 
 docs: $(VENV)/installed
 	$(BIN)/python docs/make_language.py
