@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
+import numpy as np
 import pytest
 
 import neurovis_spec as nv
@@ -88,10 +91,18 @@ def test_the_size_of_the_picture_is_that_of_the_page() -> None:
     assert stretched(high, 1 / 3) < 2
 
 
-def test_neurons_in_no_instance_run_one_way_unless_a_page_is_asked_for() -> None:
-    problem, layout = drawn(CHAIN)
+def test_neurons_in_no_instance_and_no_group_run_one_way_unless_a_page_is_asked_for() -> None:
+    """A group that is cut is followed by its name."""
+    names = [f"n{i}" for i in range(30)]
+    arrows = "".join(f"  {a} -> {b}: 1\n" for a, b in pairwise(names))
+    problem, layout = drawn(
+        f"neurovis: 1\nname: line\nneurons: {{{', '.join(f'{name}: {{}}' for name in names)}}}\nconnections:\n{arrows}"
+    )
     assert metrics(layout, problem)["flow"] == 1
     assert len({x for x, _ in layout.positions.values()}) == 1
+    _, cut = drawn(CHAIN)
+    across, down = (np.ptp([point[axis] for point in cut.positions.values()]) + 1 for axis in (0, 1))
+    assert max(across, down) <= 2.5 * min(across, down)
 
 
 def test_pins_keep_ranks_uncut() -> None:
