@@ -34,8 +34,9 @@ _IN_VAIN = 2
 #: So many numbers of bands or rows are tried one by one, further ones in steps of a fifth, up to so many; and what has
 #: more neurons and connections than the last is not folded.
 _ONE_BY_ONE, _STEP, _MOST_FOLDS, _MOST = 8, 5, 40, 3000
-#: Nothing is longer than the page by this if it can be folded, whatever that costs.
-_LONGEST = 2.5
+#: Nothing is longer than the page by this if it can be folded, whatever that costs; without instances only what has
+#: more neurons than this, as lines that run back are worth more in a smaller picture.
+_LONGEST, _MANY = 2.5, 200
 
 
 #: What can be folded: the ranks of a kind of instance, or of the whole (its number, RANKS), or the rows of instances of
@@ -123,8 +124,9 @@ def compact(problem: LayoutProblem, drawn: Drawn, folds: Mapping[Fold, range]) -
             found = _folded(lambda shape: tried(shape, drawn(problem, shape)), fold, folds[fold], found)
         best.append(found)
     least = min(best, key=attrgetter("cost"))
-    chosen = least if worth and least.cost < _WORTH[free] * first.cost else first
-    if free and chosen.long > _LONGEST:
+    cheap = least.cost < _WORTH[free] * first.cost
+    chosen = least if worth and cheap else first
+    if free and chosen.long > _LONGEST and (worth or cheap or len(problem.neurons) > _MANY):
         chosen = min(every, key=lambda one: (max(one.long, _LONGEST), one.cost))
     return replace(chosen.shape, draft=False) if chosen is not first else Shape()
 
