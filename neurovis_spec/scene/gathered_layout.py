@@ -9,6 +9,7 @@ other that there is room for what stands beside their lines.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +29,8 @@ _GROWTH, _LARGEST = 0.5, 3.0
 _AREA, _MOST_ANEW, _SPARSER = 8.0, 300, 1.5
 #: Between the rims of any two discs at least, where all move closer together, and of pathways, in layout units.
 _LEAST, _CLOSE, _TEXT = 0.15, 1.2, 1.2
+#: Ranks of pathways below each other are so many times as far apart: what stands beside a line is wide, not high.
+_RANKS = 0.6
 
 
 def radius_of(size: int) -> float:
@@ -82,7 +85,10 @@ def laid_out(drawn: Gathered, layout: Layout | None) -> Layout:
 def _anew(drawn: Gathered, larger: float) -> Layout:
     """Pathways laid out among discs that are all so many times as large as neurons: as if all else were smaller."""
     spacing = max(1.0, 2 * RADIUS + _TEXT / larger)
-    found = lay_out_problem(_problem(drawn, {}, spacing))
+    problem = _problem(drawn, {}, spacing)
+    if problem.direction in ("down", "up"):
+        problem = replace(problem, rank_spacing=_RANKS * problem.rank_spacing)
+    found = lay_out_problem(problem)
     positions = {name: _times(point, larger) for name, point in found.positions.items()}
     routes = {name: tuple(_times(point, larger) for point in route) for name, route in found.routes.items()}
     return Layout(found.network, found.engine, positions, routes)
