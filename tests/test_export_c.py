@@ -211,6 +211,34 @@ def test_events_under_the_sanitizers(tmp_path: Path) -> None:
     assert [float(line.split()[1]) for line in done.stdout.splitlines()] == pytest.approx(expected, rel=1e-5)
 
 
+TWO_DELAYS = """
+neurovis: 1
+name: kicked
+time: {dt: 0.001}
+models:
+  lif:
+    ports: [kick]
+    state: {v: {initial: 0.6, derivative: (drive - v)/0.004, jump: kick}}
+    spike: {when: v >= 1, set: {v: 0.1}}
+neurons:
+  A: {model: lif, count: 20, bias: 1.5}
+  B: {model: lif, count: 18, bias: 1.3}
+connections:
+  A -> B: {pattern: all_to_all, weight: 0.05, delay: 2, port: kick}
+  B -> B: {pattern: all_to_all, weight: 0.02, delay: 1, port: kick}
+"""
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_marks_of_spikes_have_room_whatever_a_number_is(real: str, tmp_path: Path) -> None:
+    nv.compile_text(TWO_DELAYS).export(tmp_path, real=real)
+    main = tmp_path / "main.c"
+    main.write_text(main.read_text().replace("k < 10", "k < 40"))
+    flags = ("-std=c99", *STRICT, "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    subprocess.run(["gcc", *flags, "main.c", "kicked.c", "-o", "example", "-lm"], cwd=tmp_path, check=True)
+    assert len(subprocess.run([tmp_path / "example"], capture_output=True, check=True).stdout.splitlines()) == 40
+
+
 def test_the_command_writes_a_folder_and_leaves_what_is_not_its_own(tmp_path: Path) -> None:
     spec = str(next(path for path in SPECS if path.stem == "mlp"))
     runner, folder = CliRunner(), tmp_path / "controller"

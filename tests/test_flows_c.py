@@ -156,6 +156,28 @@ def test_many_neurons_are_summed_beside_each_other_in_their_order(method: str) -
     same_bits(network, 4)
 
 
+SPRING = (
+    "v: {initial: 0.3, derivative: y - 0.3*v}, y: {initial: -0.2, derivative: -v - 0.1*y*c}, "
+    "c: {initial: 1, each_step: 0.9*c}"
+)
+GATED = "g: {initial: 1, derivative: -g}, v: {initial: 0, derivative: g*(1 - v)}"
+
+
+@pytest.mark.parametrize("method", ["euler", "exponential", "semi_implicit"])
+@pytest.mark.parametrize("states", [GATED, SPRING])
+def test_a_state_that_is_changed_in_place_is_read_as_it_was(states: str, method: str) -> None:
+    """By the derivatives of those behind it, of which the slope varies."""
+    network = nv.compile_text(
+        f"""neurovis: 1
+name: m
+time: {{dt: 0.1, integrate: {method}}}
+models: {{m: {{state: {{{states}}}, activity: v}}}}
+neurons: {{A: {{model: m, count: {c_backend.SMALL + 1}}}}}
+"""
+    )
+    same_bits(network, 20)
+
+
 @pytest.mark.parametrize("method", ["heun", "exponential"])
 def test_many_synapses_of_several_kinds_are_added_up_in_their_order(method: str) -> None:
     """Runs of connections of a kind, kinds that take turns, packed weights; and all that events do to them."""

@@ -513,7 +513,10 @@ class _Integration:
             if idle:
                 slope = f"{idle} ? {code.text(0.0)} : {code.text(slope)}"
             is_whole = self.in_place and not self.varying[key]
-            made.append(self.changed(use, name, place, slope) if is_whole else (f"fk[{at}]", slope))
+            if is_whole:  # behind all that reads it
+                made.append(self.changed(use, name, place, slope))
+            else:
+                code.line(f"fk[{at}] = {code.text(slope)};")
         self.step.store(made)
 
     def changed(self, use: Use, name: str, place: Place, change: Value) -> tuple[str, Value]:

@@ -379,7 +379,9 @@ class StepCode:
             code.line(f"{name}[{place}] = {code.text(arrivals.combined(place))};")
 
         if arrivals.rows is not None:
-            marks = "" if arrivals.in_order else self.array(-(-len(arrivals.connections) // 64))
+            words = -(-len(arrivals.connections) // 64)  # of 64 bits each, whatever a number is
+            room = words if self.code.real == "double" else 2 * words
+            marks = "" if arrivals.in_order else self.array(room)
             self.firing.add_up(arrivals, arrivals.rows, name, marks)
         elif arrivals.dense:
             arrivals.matrix(name)

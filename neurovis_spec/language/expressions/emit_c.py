@@ -142,7 +142,7 @@ class Emitter:
         >>> c.value(parse("w + 2 * rate * pre * (target - post)"), names)
         'w + 1.0*a[1]*(s - y)'
         >>> c.value(parse("x^2 if x < 0 or c else tanh(x)"), {"x": "a", "c": "p"})
-        '(a < 0.0) | (p != 0.0) ? nv_square(a) : tanh(a)'
+        '((a < 0.0) | (p != 0.0)) ? nv_square(a) : tanh(a)'
         """
         if calls or drawn is not None:
             tree, names = self._called(tree, dict(names), calls, drawn)
@@ -226,7 +226,8 @@ class _C(Writer):
         if not all(map(_is_cheap, node.operands[1:])):
             return super().logic(node)
         operands = [self.truth(operand).within(_ATOM) for operand in node.operands]
-        return Code(f" {self.both[node.operators[0]]} ".join(operands), _OR, True)
+        joined = f" {self.both[node.operators[0]]} ".join(operands)
+        return Code(f"({joined})", _ATOM, True)  # compilers warn of & before ?
 
     def square(self, base: Tree) -> Code:
         return Code(f"nv_square({self.loose(base)})", _ATOM)
