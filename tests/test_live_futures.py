@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.live import futures as kept
+from neurovis_spec.live.carry import carried
 from neurovis_spec.live.futures import Future
 from neurovis_spec.live.history import Bins, Members, Ring
 from neurovis_spec.live.protocol import command_of, status_message
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import SourceError
+from neurovis_spec.live.source import Reach, SourceError
 from neurovis_spec.live.turns import Lesion, Set
 from neurovis_spec.live.view import view_of
 
@@ -172,6 +173,36 @@ def test_every_future_is_as_it_was_left(acts: list[tuple[str, int]]) -> None:
         if now is not None and source.futures.made > made:
             left[made] = now
     assert {future.number for future in source.futures.all} <= set(left)
+
+
+def seen_at(source: SimulatedSource, step: int) -> object:
+    source.go(step)
+    snapshot = source.seen().snapshot
+    return snapshot.activity.tolist(), snapshot.weights.tolist(), source.seen().lesioned_neurons.tolist()
+
+
+@pytest.mark.parametrize("edited", [False, True])
+def test_a_future_that_begins_later_than_the_run_stays_so(edited: bool) -> None:
+    """As the oldest states are gone, or as the spec was edited: what is before them is out of reach."""
+    if edited:
+        source, end = carried(at(100), COMPILED.simulator()), 300
+    else:
+        source, end = SimulatedSource(COMPILED.simulator(), room=30_000), 1000
+        while source.step < 40:
+            source.advance()
+    source.turn(Lesion("A1"))
+    while source.step < end:
+        source.advance()
+    first = source.reach.first
+    assert first > 64
+    steps = (first, (first + end) // 2, end)
+    was = [seen_at(source, step) for step in steps]
+    source.restart()
+    source.switch(0)
+    assert source.reach == Reach(first, end)
+    assert [seen_at(source, step) for step in steps] == was
+    with pytest.raises(SourceError, match="out of reach"):
+        source.go(first - 1)
 
 
 def test_they_are_bounded_and_the_oldest_go_first(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -106,7 +106,7 @@ def test_kernels_that_are_awake_are_told_from_those_that_sleep(rhythm: Reader, t
     for step in range(11_000, 11_000 + PERIOD, 32):
         fills = discs(rhythm.see(step, theme.name))
         active = {f"K{i}": float(rhythm.recording[f"K{i}"][step]) for i in range(1, 9)}
-        for awake in (name for name, a in active.items() if a > 0.05):
+        for awake in (name for name, a in active.items() if a > 0.15):
             for asleep in (name for name, a in active.items() if a < 0.005):
                 assert apart(fills[awake], fills[asleep]) >= TOLD
                 told += 1

@@ -303,7 +303,7 @@ def test_tables_of_indices_are_as_narrow_as_can_be(indices: list[int], kind: str
     name = tables.name(np.array(indices))
     assert tables.passed_in[0].dtype == kind
     assert tables.passed_in[0].tolist() == indices
-    assert tables.pointer_lines() == {name: f"const {kind}_t *const {name} = (const {kind}_t *)p->given[0];"}
+    assert tables.pointer_lines() == {name: f"const {kind}_t *restrict const {name} = (const {kind}_t *)p->given[0];"}
 
 
 def test_the_weights_of_a_full_matrix_are_read_where_they_lie() -> None:

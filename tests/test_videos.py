@@ -243,7 +243,8 @@ def test_a_film_is_made_of_parts_that_hold_few_frames(
     whole, parts = ((tmp_path / f"{name}{suffix}").read_bytes() for name in ("whole", "parts"))
     assert len(parts) == pytest.approx(len(whole), rel=0.03)
     network.animate(tmp_path / f"recorded{suffix}", fps=50, recording=network.run(40))
-    assert (tmp_path / f"recorded{suffix}").stat().st_size == pytest.approx(len(whole), rel=0.03)
+    # gains of a recording are its own, so that numbers in the legend differ
+    assert (tmp_path / f"recorded{suffix}").stat().st_size == pytest.approx(len(whole), rel=0.05)
 
 
 def test_films_that_nobody_asked_to_be_long_are_thinned_and_it_is_said(spec: Path, tmp_path: Path) -> None:

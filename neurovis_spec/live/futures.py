@@ -6,7 +6,7 @@ They take bounded memory: of what is too much the oldest are forgotten.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -22,12 +22,13 @@ ROOM: Final = 128 << 20
 @dataclass(frozen=True, slots=True, eq=False)
 class Future:
     """Behind step ``at`` it goes on to step ``last``, with all that was ``turned`` until then, by the states ``kept``;
-    ``history`` is that of its steps alone. ``within`` are the futures that branch off from it. It is asked for by its
-    ``number``."""
+    ``history`` is that of its steps alone. ``within`` are the futures that branch off from it. Its run ``started`` at a
+    step. It is asked for by its ``number``."""
 
     number: int
     at: int
     last: int
+    started: int
     turned: tuple[Turned, ...]
     kept: tuple[Kept, ...]
     history: Ring
@@ -52,12 +53,12 @@ class Futures:
         """The one that was left last."""
         return max(self.all, key=lambda one: one.number, default=None)
 
-    def leave(self, at: int, last: int, turned: Sequence[Turned], kept: Iterable[Kept], history: Ring) -> Futures:
-        """With what came behind a step, of which these are the states and the history: the run goes on differently
-        there. What branched off from it later is within it."""
-        within = tuple(one for one in self.all if one.at > at)
-        made = Future(self.made, at, last, tuple(turned), tuple(kept), history, within)
-        rest = (*(one for one in self.all if one.at <= at), made)
+    def leave(self, left: Future) -> Futures:
+        """With a future that is left, as the run goes on differently behind its step ``at``: it gets the next number,
+        and what branched off from it later is within it."""
+        within = tuple(one for one in self.all if one.at > left.at)
+        made = replace(left, number=self.made, within=within)
+        rest = (*(one for one in self.all if one.at <= left.at), made)
         return Futures(rest, self.made + 1)
 
     def bounded(self, room: int = ROOM) -> Futures:

@@ -266,7 +266,8 @@ class SimulatedSource:
         """The futures with what came after this step among them, if anything did that can be gone to."""
         if self._last <= at or not len(self._past):
             return self.futures
-        return self.futures.leave(at, self._last, self._turned, self._past.after(at), self.history.after(at))
+        kept, history = self._past.after(at), self.history.after(at)
+        return self.futures.leave(Future(0, at, self._last, self._started, tuple(self._turned), kept, history))
 
     def switch(self, number: int) -> None:
         """Go to another future, to the step that is shown, or to its last. Raises SourceError, also where the body
@@ -283,7 +284,8 @@ class SimulatedSource:
     def _take_up(self, future: Future, step: int) -> None:
         """Go on as in a future that branches off from the run as it goes."""
         at = future.at if future.at >= self._started else -1
-        if at >= 0:
+        # what has all its states needs none of those before them
+        if self.reach.first <= at or (at >= 0 and not future.kept):
             self.go(min(self.step, at))
         others = self._left(at).without(future.number)
         if at < 0:
@@ -294,7 +296,9 @@ class SimulatedSource:
             self._past.keep(kept)
         self.history.go_on(future.history)
         self._turned, self._last, self._listed = list(future.turned), future.last, ([], ())
-        self._again(max(self.reach.first, min(step, self._last)))
+        self._started = future.started
+        first = self._past.first
+        self._again(max(first if first == self._started else first + 1, min(step, self._last)))
 
     def branch(self) -> None:
         """Have the run go on differently from here; what came after is another future."""
