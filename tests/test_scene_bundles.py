@@ -205,6 +205,21 @@ def test_what_neither_excites_nor_inhibits_is_said_in_words() -> None:
     assert "neither excite nor inhibit" in [shape.text for shape in scene.shapes() if isinstance(shape, Text)]
 
 
+def test_what_is_lesioned_is_faint_and_said() -> None:
+    text = (
+        "neurovis: 1\nname: x\nneurons: {A: {count: 5, bias: 1}, B: {count: 5}}\nlayout: {engine: grid}\n"
+        "connections: {A -> B: {pattern: all_to_all, weight: 1}}\nevents: [{at: 2, lesion: [GONE]}]\n"
+    )
+    whole, some = (nv.compile_text(text.replace("GONE", gone)) for gone in ("A", "A1"))
+    for network, step, lost in ((whole, 1, 0), (whole, 2, 20), (some, 2, 5)):
+        (bundle,) = bundles_of(drawn(network, step, most=5)).values()
+        assert bundle.opacity == (0.3 if lost == 20 else 1)
+        assert ("of them lesioned" in bundle.title) == bool(lost)
+        assert int(bundle.data.get("lesioned", 0)) <= lost
+    svg = file_of(drawn(whole, 2, most=5), ".svg").decode()
+    assert re.search('<g class="bundle"[^>]* opacity="\\.3">', svg)
+
+
 def test_all_kinds_of_files_show_them(layers: CompiledNetwork) -> None:
     recording = layers.run(3)
     scene = drawn(layers)

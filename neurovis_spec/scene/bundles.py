@@ -21,6 +21,7 @@ from neurovis_spec.layout.geometry import Rect
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.geometry import samples
 from neurovis_spec.scene.hubs import Hub, hubs_of
+from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.lines import Line, trimmed
 from neurovis_spec.scene.model import Group, Shape, Spline, Text, Theme, ended
 from neurovis_spec.scene.obstacles import Obstacles
@@ -235,8 +236,9 @@ def ink(theme: Theme, end: int, lone: bool = False) -> str:
     return mixed(theme.background, colour, _LONE_SHARE if lone else _SHARE)
 
 
-def drawn(network: Network, bundle: Bundle, theme: Theme, step: int) -> Group:
-    """A bundle as a group of a scene; its sums are those of a step."""
+def drawn(network: Network, bundle: Bundle, theme: Theme, step: int, gone: frozenset[int] = frozenset()) -> Group:
+    """A bundle as a group of a scene; its sums are those of a step, by which the connections ``gone`` are lesioned: it
+    is faint where that are all of it."""
     one, shapes = bundle.pathway, list[Shape]()
     for band in bundle.bands:
         colour, end = ink(theme, band.strand.end, bundle.lone), band.strand.end if theme.ends == "signs" else 1
@@ -245,10 +247,13 @@ def drawn(network: Network, bundle: Bundle, theme: Theme, step: int) -> Group:
     data = {"class": "bundle", "pathway": name, "count": str(one.count), "sum": f"{one.total:.12g}"}
     data |= {_DOES[strand.end]: f"{strand.total:.12g}" for strand in one.strands}
     data |= {"learns": ", ".join(one.rules)} if one.rules else {}
-    return Group(tuple(shapes), f"bundle:{name}", data, _said(name, one, step))
+    lost = len(gone.intersection(one.members.tolist()))
+    data |= {"lesioned": str(lost)} if lost else {}
+    opacity = FAINT if lost == len(one.members) else 1.0
+    return Group(tuple(shapes), f"bundle:{name}", data, _said(name, one, step, lost), opacity)
 
 
-def _said(name: str, one: Pathway, step: int) -> str:
+def _said(name: str, one: Pathway, step: int, lost: int) -> str:
     """What a pointer shows of a bundle."""
     when = f" at step {step:,}" if one.rules else ""
     strands = [
@@ -256,7 +261,8 @@ def _said(name: str, one: Pathway, step: int) -> str:
     ]
     low, high = one.delays
     delays = [] if high == low == 1 else [f"delay {low}" if low == high else f"delay {low} … {high}"]
-    return "\n".join([f"{name.replace('->', '→')} · {one.count:,}", *strands, *one.rules, *delays])
+    lesioned = [f"{lost:,} of them lesioned"] if lost else []
+    return "\n".join([f"{name.replace('->', '→')} · {one.count:,}", *strands, *lesioned, *one.rules, *delays])
 
 
 class Told(NamedTuple):

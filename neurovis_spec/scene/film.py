@@ -195,7 +195,7 @@ def still(film: Film, frame: int) -> Scene:
                 case _:
                     shapes.append(shape)
         faint = group.id in film.faint and frame >= film.faint[group.id]
-        return replace(group, shapes=tuple(shapes), opacity=film.faintness if faint else 1.0)
+        return replace(group, shapes=tuple(shapes), opacity=film.faintness if faint else group.opacity)
 
     title = film.titles[frame] if film.titles else film.scene.title
     return replace(film.scene, title=title, groups=tuple(repaint(group) for group in film.scene.groups))

@@ -154,7 +154,7 @@ def plan(
     page = _on_page(content, framed, gains, layout, theme)
     said = _texts(content, page, settings)
     rings = np.minimum(2.5, 0.12 * page.radii)
-    lone, joined = _bundle_groups(network, page.bundles, theme, 0 if begin is None else begin.step)
+    lone, joined = _bundle_groups(content, page.bundles, theme, 0 if begin is None else begin.step)
     made = Plan(
         network=network,
         gains=gains,
@@ -732,10 +732,14 @@ def _titled_groups(network: Network, boxes: Sequence[Box]) -> frozenset[str]:
     return frozenset(group.name for group in network.neurons.groups if tuple(group.indices) in held)
 
 
-def _bundle_groups(network: Network, left: bundles.Bundles, theme: Theme, step: int) -> tuple[list[Group], list[Group]]:
+def _bundle_groups(
+    content: _Content, left: bundles.Bundles, theme: Theme, step: int
+) -> tuple[list[Group], list[Group]]:
     """Bundles beneath the lines, and above these, with the names of hubs."""
+    gone = frozenset(connection for connection, at in content.lesions.connections.items() if at <= step)
     lone, joined = (
-        [bundles.drawn(network, one, theme, step) for one in left.all if one.lone is alone] for alone in (True, False)
+        [bundles.drawn(content.network, one, theme, step, gone) for one in left.all if one.lone is alone]
+        for alone in (True, False)
     )
     return lone, [*joined, *([Group(left.names, id="hubs")] if left.names else [])]
 
