@@ -94,6 +94,8 @@ class End:
     path: int
     #: the neurons that tables call otherwise, by what they call them
     by_id: Mapping[str, tuple[int, ...]]
+    #: whether any name may be that of one, as what tables call some is invalid
+    open: bool = False
 
     @cached_property
     def positions(self) -> Mapping[str, int] | Unknown:
@@ -105,7 +107,7 @@ class End:
     def indices(self, names: tuple[str, ...]) -> IntArray:
         """The position of each of these neurons; −1 where one cannot belong to the end, 0 where it may."""
         if self.positions is UNKNOWN:
-            known = (self.directory.find(name) is not None or name in self.by_id for name in names)
+            known = (self.open or self.directory.find(name) is not None or name in self.by_id for name in names)
             return np.array([0 if one else -1 for one in known], dtype=np.int64)
         places: dict[str, tuple[int, ...]] = {name: (self.positions.get(name, -1),) for name in names}
         if self.by_id:

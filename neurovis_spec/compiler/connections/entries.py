@@ -587,8 +587,16 @@ class EntryBuilder:
     def _edges(self) -> _Shape | Unknown:
         assert self.body.edges is not None
         called, path = self.context.census.neurons.names, len(self.context.scope.called(""))
+        census = self.context.census
         sources, targets = (
-            End(neurons, self.context.directory, called, path, self.context.census.by_id)
+            End(
+                neurons if census.ids_known else UNKNOWN,
+                self.context.directory,
+                called,
+                path,
+                census.by_id,
+                not census.ids_known,
+            )
             for neurons in (self.sources, self.targets)
         )
         reader = EdgeReader(

@@ -96,7 +96,7 @@ class Built(NamedTuple):
     names: tuple[str, ...]
     labels: tuple[str, ...]
     #: what tables call its neurons, "" where they have no other name
-    ids: tuple[str, ...]
+    ids: tuple[str, ...] | Unknown
     #: the box of each, "" where it is in none, if a table says so
     boxes: tuple[str, ...]
     bias: FloatArray
@@ -450,26 +450,33 @@ class Builder:
         titles = known(table.texts(model.box, gaps=True), ())
         return tuple(title and self.scope.called(title) for title in titles)
 
-    def _ids(self, model: GroupModel, names: tuple[str, ...] | Unknown, table: TableReader) -> tuple[str, ...]:
-        """What tables call the neurons, each otherwise; nothing where that is not said, or invalid."""
+    def _ids(
+        self, model: GroupModel, names: tuple[str, ...] | Unknown, table: TableReader
+    ) -> tuple[str, ...] | Unknown:
+        """What tables call the neurons, each otherwise; nothing where that is not said, UNKNOWN where it is invalid."""
+        if "ids" in model.unknown or (model.ids is not None and names is UNKNOWN):
+            return UNKNOWN
         if model.ids is None or names is UNKNOWN:
             return ()
         findings, node = self.constants.findings, model.source.get("ids")
         if isinstance(model.ids, TableColumn):
             (column,) = model.ids.columns
-            ids, spans = known(table.texts(model.ids, gaps=True), ()), [column.span] * len(names)
+            texts, spans = table.texts(model.ids, gaps=True), [column.span] * len(names)
+            if texts is UNKNOWN:
+                return UNKNOWN
+            ids = texts
         else:
             ids, spans = tuple(one.value.strip() for one in model.ids), [one.span for one in model.ids]
             if len(ids) != len(names):
                 message = f"'ids' has {plural(len(ids), 'text')} for {plural(len(names), 'neuron')}"
                 findings.error("wrong-size", model.source.span if node is None else node.span, message)
-                return ()
+                return UNKNOWN
         first: dict[str, str] = {}
         for one, name, place in zip(ids, names, spans, strict=False):
             if one and first.setdefault(one, name) != name:
                 message = f"'{shorten(one)}' is the id of '{first[one]}' and of '{name}'"
                 findings.error("duplicate-name", place, message, "give each neuron its own", key=name)
-        return ids
+        return ids if len(first) == sum(map(bool, ids)) else UNKNOWN
 
     def _labels(self, model: GroupModel, names: tuple[str, ...], table: TableReader) -> tuple[str, ...] | Unknown:
         """What stands at the neurons in pictures; UNKNOWN where that is invalid."""

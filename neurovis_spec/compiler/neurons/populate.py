@@ -31,7 +31,7 @@ from neurovis_spec.compiler.program import Definition
 from neurovis_spec.language.located import IDENTIFIER, Located
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.tables import TableColumn
-from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
 
 Number = TypeVar("Number", np.float64, np.int64)
 #: Characters that no name has.
@@ -103,10 +103,15 @@ class Census:
         """The neurons that tables call otherwise, by what they call them."""
         found: dict[str, tuple[int, ...]] = {}
         for built in self.groups:
-            for neuron, one in enumerate(built.ids, built.group.start):
+            for neuron, one in enumerate(known(built.ids, ()), built.group.start):
                 if one:
                     found[one] = (*found.get(one, ()), neuron)
         return found
+
+    @property
+    def ids_known(self) -> bool:
+        """Whether what tables call the neurons is valid wherever it is said."""
+        return all(one.ids is not UNKNOWN for one in self.groups)
 
     @cached_property
     def moving(self) -> Assembled:

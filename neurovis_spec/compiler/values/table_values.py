@@ -31,12 +31,12 @@ _IN_ORDER: Final = "by: COLUMN finds rows by the names of neurons, where: {COLUM
 class TableReader:
     """Reads values of some neurons, whose names in their scope these are, behind the ``path`` of the scope; UNKNOWN
     where it is not known which neurons there are. ``ids`` are what tables call them, "" for nothing else, if any are
-    called otherwise."""
+    called otherwise; UNKNOWN where that is invalid."""
 
     files: Files
     names: tuple[str, ...] | Unknown
     path: str
-    ids: tuple[str, ...] = ()
+    ids: tuple[str, ...] | Unknown = ()
 
     @property
     def _findings(self) -> Findings:
@@ -134,8 +134,10 @@ class TableReader:
         rows = np.full(len(names), -1, dtype=np.int64)
         for neuron, name in enumerate(names):
             own = self.path + name if self.path + name in row_of else name
-            if own not in row_of and self.ids and self.ids[neuron]:
-                own = self.ids[neuron]
+            if own not in row_of:
+                if self.ids is UNKNOWN:
+                    return UNKNOWN
+                own = (self.ids[neuron] if self.ids else "") or own
             rows[neuron] = row_of.get(own, -1)
             if own in twice:
                 pair = f"rows {sheet.sheet.where(row_of[own])} and {sheet.sheet.where(twice[own])}"
