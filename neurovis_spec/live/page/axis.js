@@ -3,6 +3,7 @@
  */
 
 import { THUMB } from './scrubber.js';
+import { roundAbove, written } from './ticks.js';
 
 /** @typedef {import('./scrubber.js').Scrubber} Scrubber */
 /** @typedef {{step: number, unit: string} | null} Time how long a step is, and in what unit; null where a spec says nothing */
@@ -10,19 +11,6 @@ import { THUMB } from './scrubber.js';
 /** How far apart ticks are at least, and how long they are, in pixels of a page. */
 const APART = 80,
   LONG = 4;
-
-/** The distance of ticks: 1, 2 or 5 times a power of ten, and no less than this. @param {number} least @returns {number} */
-function niceStep(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return [1, 2, 5, 10].map((times) => times * power).find((step) => step >= least * (1 - 1e-9)) ?? 10 * power;
-}
-
-/** A number with so many decimals as tell multiples of a distance apart. @param {number} value @param {number} apart
- * @returns {string} */
-function decimal(value, apart) {
-  const decimals = Math.max(0, Math.min(12, -Math.floor(Math.log10(apart) + 1e-9)));
-  return value.toFixed(decimals).replace('-', '−');
-}
 
 /** Draws the ticks, and says what time a step is. */
 export class Axis {
@@ -45,7 +33,7 @@ export class Axis {
 
   /** What a step is called. @param {number} step @returns {string} */
   words(step) {
-    return this.time ? `${decimal(step * this.time.step, this.time.step)} ${this.time.unit}` : `step ${step}`;
+    return this.time ? `${written(step * this.time.step, this.time.step)} ${this.time.unit}` : `step ${step}`;
   }
 
   /** Draw them, where others are to be seen. */
@@ -65,11 +53,11 @@ export class Axis {
     context.font = `${style.fontSize} ${style.fontFamily}`;
     context.textAlign = 'center';
     context.textBaseline = 'bottom';
-    const apart = niceStep(Math.max(long, ((high - low) * long * APART) / Math.max(1, width - 2 * THUMB)));
+    const apart = roundAbove(Math.max(long, ((high - low) * long * APART) / Math.max(1, width - 2 * THUMB)));
     context.beginPath();
     for (let at = Math.ceil((low * long) / apart - 1e-9); at * apart <= high * long * (1 + 1e-12) + 1e-12; at++) {
       const x = THUMB + scrubber.across((at * apart) / long) * (width - 2 * THUMB),
-        text = decimal(at * apart, apart),
+        text = written(at * apart, apart),
         half = context.measureText(text).width / 2;
       context.moveTo(x, 0);
       context.lineTo(x, LONG);

@@ -3,6 +3,7 @@
  */
 
 import { channels } from './colours.js';
+import { roundAbove, written } from './ticks.js';
 
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Scene} Scene */
@@ -43,17 +44,10 @@ const WAY = 2,
 /** A solid as high as the ground is the ground. */
 const FLAT = 1e-6;
 
-/** The smallest of 1, 2 and 5 times a power of ten that is no less. @param {number} least @returns {number} */
-function roundAbove(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return /** @type {number} */ ([1, 2, 5, 10].find((times) => times * power >= least * (1 - 1e-9)) ?? 10) * power;
-}
-
 /** A number of metres with as many decimals as multiples of `step` have. @param {number} value @param {number} step
  * @returns {string} */
 function metres(value, step) {
-  const words = value.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
-  return `${Number(words) === 0 ? '0' : words.replace('-', '−')} m`;
+  return `${value === 0 ? '0' : written(value, step)} m`;
 }
 
 /** A colour of which so much is left in another one. @param {string} colour @param {string} other @param {number} share
