@@ -142,8 +142,7 @@ class View:
             elif name:
                 members = None if quantities is None else self.members(item)
                 if members is not None and quantities is not None:
-                    own = quantities[members.indices]
-                    value = float(own.sum() if members.joined == "sum" else own.mean())
+                    value = float(members.join(quantities[members.read][None])[0])
                     result |= {} if math.isnan(value) else {item: value}
             elif index < len(values):
                 result[item] = float(values[index])

@@ -236,7 +236,7 @@ def ink(theme: Theme, end: int, lone: bool = False) -> str:
     return mixed(theme.background, colour, _LONE_SHARE if lone else _SHARE)
 
 
-def drawn(network: Network, bundle: Bundle, theme: Theme, step: int, gone: frozenset[int] = frozenset()) -> Group:
+def drawn(network: Network, bundle: Bundle, theme: Theme, step: int, gone: frozenset[int]) -> Group:
     """A bundle as a group of a scene; its sums are those of a step, by which the connections ``gone`` are lesioned: it
     is faint where that are all of it."""
     one, shapes = bundle.pathway, list[Shape]()
