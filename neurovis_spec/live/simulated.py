@@ -105,12 +105,15 @@ class SimulatedSource:
 
     @property
     def reach(self) -> Reach:
-        """From the beginning, if that is still kept, else from the second step that is: a picture needs the weights of
-        the step before."""
-        if not len(self._past):
-            return Reach(self.step, self._last)
+        """The steps that it can go to."""
+        return Reach(min(self.step, self._first_seen) if len(self._past) else self.step, self._last)
+
+    @property
+    def _first_seen(self) -> int:
+        """The first step of the past: where the run began, if that is still kept, else the second step that is: a
+        picture needs the weights of the step before."""
         first = self._past.first
-        return Reach(min(self.step, first if first == self._started else first + 1), self._last)
+        return first if first == self._started else first + 1
 
     @property
     def turned(self) -> tuple[Turned, ...]:
@@ -235,16 +238,13 @@ class SimulatedSource:
             return
         self._check_going()
         with self._whole():
-            kept = self._past.before(step - 1) or self._past.before(step)
-            if step < self.step or (kept is not None and kept.state.k > self._simulation.k):
-                self._again(step)
-            while self.step < step:
-                self._next(self._seen.snapshot)
+            self._make_up_to(step, again=step < self.step)
 
-    def _again(self, step: int) -> None:
-        """Make a step again, from the latest state before it that is kept."""
+    def _make_up_to(self, step: int, again: bool) -> None:
+        """Make the steps up to one, from where the run is, or, ``again`` or where that is nearer, from the latest state
+        before it that is kept."""
         kept = self._past.before(step - 1) or self._past.before(step)
-        if kept is not None:
+        if kept is not None and (again or kept.state.k > self._simulation.k):
             self._take(kept)
             self._next(None)
         while self.step < step:
@@ -297,8 +297,7 @@ class SimulatedSource:
         self.history.go_on(future.history)
         self._turned, self._last, self._listed = list(future.turned), future.last, ([], ())
         self._started = future.started
-        first = self._past.first
-        self._again(max(first if first == self._started else first + 1, min(step, self._last)))
+        self._make_up_to(max(self._first_seen, min(step, self._last)), again=True)
 
     def branch(self) -> None:
         """Have the run go on differently from here; what came after is another future."""
