@@ -103,7 +103,7 @@ def served(test: Callable[[Live], Awaitable[None]]) -> None:
     """Run a test with a server."""
 
     async def main() -> None:
-        async with serving() as live, asyncio.timeout(60):
+        async with serving() as live, asyncio.timeout(600):
             await test(live)
 
     asyncio.run(main())
@@ -123,7 +123,7 @@ class Eyes:
         #: items (connections, then neurons) with the least and the largest value of each bin
         self.traces: dict[int, np.ndarray[Any, Any]] = {}
 
-    async def look(self, acknowledge: bool = True, seconds: float = 10.0) -> int:
+    async def look(self, acknowledge: bool = True, seconds: float = 120.0) -> int:
         """The kind of the next message: SCENE, FRAME, or 0 for a text."""
         message = await self.stream.receive(timeout=seconds)
         assert message.type in (WSMsgType.TEXT, WSMsgType.BINARY), message

@@ -10,6 +10,7 @@ desk; what is refused is told.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -168,8 +169,8 @@ class Hub:
             self._reader = self._loop.call_at(self._rest, self._read_traces)
 
     def _read_traces(self) -> None:
-        """Read traces for whoever has waited longest; the longer it takes the longer is the rest."""
-        begun, shown = self._loop.time(), self._shown
+        """Read traces for whoever has waited longest; the more time of the processor it takes the longer is the rest."""
+        begun, shown = time.thread_time(), self._shown
         client, self._reader = self._waiting.popleft(), None
         wanted, client.wanted = client.wanted, None
         if client in self._clients and shown is not None and wanted is not None:
@@ -186,8 +187,7 @@ class Hub:
                 *(self._raster(shown, item, wanted.bins) for item in wanted.rasters),
             )
             client.wake.set()
-        now = self._loop.time()
-        self._rest = now + _REST * (now - begun)
+        self._rest = self._loop.time() + _REST * (time.thread_time() - begun)
         if self._waiting:
             self._reader = self._loop.call_at(self._rest, self._read_traces)
 
