@@ -91,6 +91,9 @@ def test_a_matrix_is_the_same_by_its_name_as_where_it_is_used() -> None:
         ("{matrix: W, d", "{matrix: Wz, d", "unknown-matrix", "Wz, d", "there is no matrix 'Wz'"),
         ("{matrix: D}", "{matrix: E}", "unknown-matrix", "E}", "there is no matrix 'E'"),
         ("matrices: {W", "matrices: {h: [[1]], W", "duplicate-name", "h: [[1", "a parameter of this module"),
+        ("matrices: {W", "matrices: {V: {file: none.csv}, W", "file-missing", "none.csv", "'none.csv'"),
+        ("matrices: {W", "matrices: {V: [[1], [q]], W", "unknown-name", "q]], W", "'q'"),
+        ("{W: {file: w.csv}, D", "{W: {file: none.csv}, D", "file-missing", "none.csv", "'none.csv'"),
         ("[[h - 2, 1], [1, 2]]", "7", "wrong-type", "7}", "a list of rows"),
     ],
 )
@@ -104,6 +107,13 @@ def test_matrices_that_cannot_be(folder: Path, old: str, new: str, code: str, pl
     assert message in first.message
     line = (HEAD + text).splitlines()[first.span.line - 1]
     assert line[first.span.column - 1 :].startswith(place)
+
+
+def test_what_several_instances_set_is_all_checked(folder: Path) -> None:
+    text = SPEC.replace("[[g, ~], [i*10, j]]", "[[1, 2], [3]]").replace("v.csv", "vv.csv")
+    with pytest.raises(nv.SpecError) as caught:
+        compiled(text, folder)
+    assert [one.code for one in caught.value.diagnostics] == ["ragged-matrix", "file-missing"]
 
 
 def test_a_spec_has_no_matrices_of_its_own() -> None:

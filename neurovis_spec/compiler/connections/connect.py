@@ -6,7 +6,7 @@ matrix or pattern row by row), and for each plastic entry what it learns by.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -37,6 +37,8 @@ from neurovis_spec.compiler.network import PLAIN_ROUTE, Connections
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Tie
 from neurovis_spec.compiler.taken import Wired
+from neurovis_spec.compiler.values.draws import Stream
+from neurovis_spec.compiler.values.matrices import grid_of
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.sections import ConnectionModel, written
@@ -141,18 +143,20 @@ def connect(
     failed: set[str | None] = set()
     for scope, directory in zip(scopes, census.directories, strict=True):
         if scope.module is not None and scope.module in failed:
+            _check_matrices(scope, (), seed)  # those that this instance sets are its own
             continue
         section, findings = scope.section, scope.constants.findings
         if "connections" in section.unknown or written(section.source) > len(section.connections):
             failed.add(scope.module)
         named = list(_named(section.connections, directory, findings))
         made: dict[int, Bundle] = {}
+        read: set[str] = set()
         originals: dict[str, Original | Unknown | None] = {one.name: None for one in named if one.tied}
         # what is tied to another entry is made behind all that have weights of their own
         for place in sorted(range(len(named)), key=lambda place: named[place].tied):
             entry, before = named[place], findings.errors
             room = limits.connections - total
-            around = EntryContext(scope, directory, census, limits, seed, room, originals, style)
+            around = EntryContext(scope, directory, census, limits, seed, room, originals, read, style)
             bundle = EntryBuilder(around, *entry).build()
             sound = bundle is not UNKNOWN and findings.errors == before
             if not entry.tied:
@@ -163,7 +167,17 @@ def connect(
                 total += len(bundle.sources)
                 made[place] = bundle
         result += (made[place] for place in sorted(made))
+        _check_matrices(scope, read, seed)
     return Connected(tuple(result), not failed)
+
+
+def _check_matrices(scope: Scope, read: Collection[str], seed: int) -> None:
+    """Findings of the matrices of a scope that none of its entries has ``read``: whatever stands in a spec is checked,
+    and what is said of it where it is read a second time, in an instance around or within, is not said again."""
+    for name, given in scope.matrices.items():
+        if name not in read and given is not UNKNOWN:
+            stream = Stream(seed, "weight", scope.declares(name))
+            grid_of(given.written, UNKNOWN, UNKNOWN, False, given.constants, given.files, stream)
 
 
 class _Entry(NamedTuple):

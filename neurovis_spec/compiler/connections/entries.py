@@ -204,6 +204,8 @@ class EntryContext(NamedTuple):
     room: int
     #: the entries that weights may be tied to
     originals: Entries
+    #: the matrices of the scope that entries have asked for, by their names
+    read: set[str]
     #: the column of edges whose values pictures tell apart
     style: Located[str] | None = None
 
@@ -453,6 +455,7 @@ class EntryBuilder:
         if not isinstance(matrix, MatrixName):
             return GivenMatrix(matrix, self.constants, scope.files)
         found, name = scope.matrices.get(matrix.name.value), matrix.name.value
+        self.context.read.add(name)
         if found is not None:
             return found
         hint = suggest(name, scope.matrices, "matrices of the module") if scope.matrices else None
