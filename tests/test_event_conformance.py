@@ -305,6 +305,24 @@ def test_weights_stay_within_their_bounds() -> None:
     assert found.weight("A1 -> K1")[2] == 0.6
 
 
+@pytest.mark.parametrize("backend", ["reference", "numpy"])
+def test_a_weight_that_learns_stays_where_its_bounds_alone_are_set(backend: str) -> None:
+    """Whether an event sets it later on, or has set it before."""
+    bounded = LEARNING.replace(
+        "plasticity: {hebbian: {rate: 0.01}}", "plasticity: {hebbian: {rate: 0.01}}, bounds: [0, g]"
+    )
+    plain = compiled(with_event("{at: 2, set: {g: 0.8}}", bounded)).run(4, backend=backend)
+    later = compiled(with_event("{at: 2, set: {g: 0.8}}, {at: 3, set: {A -> K: 0.6}}", bounded))
+    found = later.run(4, backend=backend).weight("A1 -> K1")
+    assert found[:3].tolist() == plain.weight("A1 -> K1")[:3].tolist()
+    assert found[3] == 0.6
+    before = compiled(with_event("{at: 1, set: {A -> K: 0.3}}, {at: 3, set: {g: 0.8}}", bounded))
+    without = compiled(with_event("{at: 1, set: {A -> K: 0.3}}", bounded))
+    one, other = (spec.run(4, backend=backend).weight("A1 -> K1") for spec in (before, without))
+    assert one.tolist() == other.tolist()
+    assert one[3] > 0.3
+
+
 def test_one_that_is_lost_is_told_and_one_of_a_weight_is_not_without_effect() -> None:
     text = with_event("{at: 1, set: {A -> K: 0.3, S -> K: 1}}, {at: 1, set: {S -> K: 2}}")
     messages = [(one.code, one.message) for one in compiled(text).warnings]

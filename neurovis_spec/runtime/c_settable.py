@@ -203,7 +203,7 @@ def _outside(code: Code, value: str, low: float | Dependent, high: float | Depen
 
 def _write_binding(code: Code, binding: Binding, settable: Settable) -> None:
     """What one formula gives, checked in the first round, written in the second; without indices it is only checked."""
-    condition = " || ".join(f"changed[{slot}]" for slot in sorted(binding.slots))
+    condition = " || ".join(f"changed[{slot}]" for slot in sorted(binding.written_by(settable.own_count)))
     count = _count(binding, settable)
     array = "weights" if binding.weights else "x"
     bounds = [bound for bound in (binding.low, binding.high) if bound is not None]

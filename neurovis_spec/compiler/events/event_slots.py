@@ -137,8 +137,7 @@ class _Making:
         """Another slot, whose index this gives."""
         before = self.settable
         count = len(before.slots)
-        own = count if before.of_events is None else before.of_events
-        self.settable = replace(before, slots=(*before.slots, Slot(name, 0.0)), of_events=own)
+        self.settable = replace(before, slots=(*before.slots, Slot(name, 0.0)), of_events=before.own_count)
         return count
 
     def _bind(self, formula: ParameterFormula, members: IntArray) -> None:

@@ -241,6 +241,12 @@ class Binding:
         """The parameters that it reads."""
         return self.formula.slots.union(*(bound.slots for bound in (self.low, self.high) if bound is not None))
 
+    def written_by(self, of_events: int) -> frozenset[int]:
+        """The parameters that have its numbers written anew. A weight that an event sets, to what slots from
+        ``of_events`` on hold, stays where its bounds alone are others: it is what it has become since."""
+        own = self.formula.slots
+        return own if any(slot >= of_events for slot in own) else self.slots
+
 
 class Variable(NamedTuple):
     """An array of a network in the vector of numbers that can be set, from ``start`` on; of size 1 where all of its
@@ -270,10 +276,15 @@ class Settable:
         """The index of each slot by the name of its parameter."""
         return {slot.name: index for index, slot in enumerate(self.slots[: self.of_events])}
 
+    @property
+    def own_count(self) -> int:
+        """How many slots are parameters; those behind them events alone set."""
+        return len(self.slots) if self.of_events is None else self.of_events
+
     @cached_property
     def given_by_events(self) -> tuple[Binding, ...]:
         """The bindings of weights that events give, and no parameter."""
-        first = len(self.slots) if self.of_events is None else self.of_events
+        first = self.own_count
         return tuple(one for one in self.bindings if one.weights and any(slot >= first for slot in one.formula.slots))
 
     @cached_property
@@ -299,10 +310,10 @@ class Settable:
 
     @cached_property
     def readers(self) -> tuple[tuple[int, ...], ...]:
-        """For each slot the bindings that read it, ascending."""
+        """For each slot the bindings that are written anew where it is set, ascending."""
         result: list[list[int]] = [[] for _ in self.slots]
         for index, binding in enumerate(self.bindings):
-            for read in binding.slots:
+            for read in binding.written_by(self.own_count):
                 result[read].append(index)
         return tuple(map(tuple, result))
 

@@ -159,8 +159,7 @@ class _TrialRun:
         self._held = Held.none(self.network.held_as_spikes)
         self._arrays: dict[tuple[Binding, ...], tuple[_WrittenArray, ...]] = {}
         #: the slots that events alone set, and those of them that say what inputs are fed
-        end = len(settable.slots) if settable.of_events is None else settable.of_events
-        self._own = frozenset(range(end, len(settable.slots)))
+        self._own = frozenset(range(settable.own_count, len(settable.slots)))
         sizes = {name: self.network.input_index[name].size for name in settable.feeds}
         self._fed = {name: [*range(first, first + 1 + sizes[name])] for name, first in sorted(settable.feeds.items())}
         self._read_in_run = self._slots_read_in_run()
