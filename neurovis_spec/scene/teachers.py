@@ -136,35 +136,53 @@ def dotted(
     a disc or along other lines, but never out of their ``rooms``; between mirror ``images`` mirrored, by what both
     would run over."""
     number = {(guide.sources, guide.targets): i for i, guide in enumerate(guides)}
-    found: dict[int, Line] = {}
+    sides: list[Mapping[int, int]] = []  # of each guide that is drawn by itself those that are, and to which side
+    done: set[int] = set()
     for i, guide in enumerate(guides):
-        if i in found:
+        if i in done:
             continue
         mirrored = (tuple(sorted(images.get(one, -1) for one in some)) for some in (guide.sources, guide.targets))
         image = number.get((next(mirrored), next(mirrored)), i)
-        best: tuple[float, dict[int, Line]] | None = None
-        for bend in _BENDS:
-            cost, lines = 4 * abs(bend), dict[int, Line]()
-            for k, side in {image: -1, i: 1}.items():
-                lines[k] = _line(hubs[k], radius, side * bend)
-                (ax, ay), (bx, by) = (hub.centre for hub in hubs[k])
-                dots = sample(lines[k].points, max(8, int(math.dist((ax, ay), (bx, by)) / 6)))
-                out = bend and not _within(dots, rooms[k])
-                cost += math.inf if out else obstacles.path_hits(dots[2:-2], guides[k].ends)
-            if best is None or cost < best[0]:
-                best = (cost, lines)
-        found |= best[1] if best is not None else {}
+        sides.append({image: -1, i: 1})
+        done |= {image, i}
+    lines = iter(
+        _lines([(hubs[k], side * bend) for own in sides for bend in _BENDS for k, side in own.items()], radius)
+    )
+    found: dict[int, Line] = {}
+    for own in sides:
+        tried = [(bend, {k: next(lines) for k in own}) for bend in _BENDS]
+        costs = [_cost(bend, some, guides, hubs, obstacles, rooms) for bend, some in tried]
+        found |= tried[costs.index(min(costs))][1]
     return [found[i] for i in range(len(guides))]
 
 
-def _line(hubs: tuple[Hub, Hub], radius: float, bend: float) -> Line:
-    """The dotted line from hub to hub with this bend."""
-    start, end = (np.array(hub.centre) for hub in hubs)
-    along, far = end - start, math.dist(hubs[0].centre, hubs[1].centre)
-    x, y = (along / far).tolist() if far > 0 else (1.0, 0.0)
-    rims = np.array([[hubs[0].rim((x, y)), hubs[1].rim((-x, -y))]])
-    (line,) = trimmed([_bent(start, end, bend)], rims, radius, air=1.0)
-    return line
+def _cost(
+    bend: float,
+    lines: Mapping[int, Line],
+    guides: Sequence[Guide],
+    hubs: Sequence[tuple[Hub, Hub]],
+    obstacles: Obstacles,
+    rooms: Sequence[Rect],
+) -> float:
+    """What these dotted lines with this bend would run over."""
+    cost = 4 * abs(bend)
+    for k, line in lines.items():
+        dots = sample(line.points, max(8, int(math.dist(hubs[k][0].centre, hubs[k][1].centre) / 6)))
+        out = bend and not _within(dots, rooms[k])
+        cost += math.inf if out else obstacles.path_hits(dots[2:-2], guides[k].ends)
+    return cost
+
+
+def _lines(wanted: Sequence[tuple[tuple[Hub, Hub], float]], radius: float) -> list[Line]:
+    """The dotted lines from hub to hub, each with a bend."""
+    routes, rims = list[FloatArray](), list[tuple[float, float]]()
+    for (one, other), bend in wanted:
+        start, end = np.array(one.centre), np.array(other.centre)
+        along, far = end - start, math.dist(one.centre, other.centre)
+        x, y = (along / far).tolist() if far > 0 else (1.0, 0.0)
+        rims.append((one.rim((x, y)), other.rim((-x, -y))))
+        routes.append(_bent(start, end, bend))
+    return trimmed(routes, np.array(rims).reshape(-1, 2), radius, air=1.0)
 
 
 def _within(dots: FloatArray, room: Rect) -> bool:
