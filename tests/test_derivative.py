@@ -40,7 +40,7 @@ def by_difference(tree: Tree, point: dict[str, float], name: str) -> float | Non
 
 
 @given(FORMULAS, st.lists(NUMBERS, min_size=3, max_size=3))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_a_derivative_is_that_of_differences(tree: Tree, values: list[float]) -> None:
     point = dict(zip(NAMES, values, strict=True))
     expected = by_difference(tree, point, "a")

@@ -52,13 +52,13 @@ def arrays(state: State) -> dict[str, FloatArray]:
     }  # fmt: skip
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(spec=flowing_specs())
 def test_each_step_begun_in_the_references_state_agrees(spec: Spec) -> None:
     follow(spec, exact=False)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(spec=flowing_specs(exact=True))
 def test_sums_and_products_are_those_of_the_reference_bit_for_bit(spec: Spec) -> None:
     follow(spec, exact=True)
@@ -83,7 +83,7 @@ def follow(spec: Spec, exact: bool) -> None:
                     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12, err_msg=f"{name} at {k}")
 
 
-@settings(max_examples=15, deadline=None, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=10, deadline=None, phases=(Phase.explicit, Phase.generate))
 @given(spec=flowing_specs(), backend=st.sampled_from(["reference", "numpy"]), cut=st.integers(1, STEPS - 1))
 def test_a_run_in_pieces_is_the_whole_one(
     spec: Spec, backend: str, cut: int, tmp_path_factory: pytest.TempPathFactory
@@ -112,7 +112,7 @@ def in_pieces(network: Network, backend: str, cut: int, checkpoint: Path) -> Non
                 np.testing.assert_array_equal(found, expected)
 
 
-@settings(max_examples=25, deadline=None, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=15, deadline=None, phases=(Phase.explicit, Phase.generate))
 @given(spec=flowing_specs(), cut=st.integers(0, STEPS - 1))
 def test_an_edit_of_nothing_changes_nothing(spec: Spec, cut: int) -> None:
     """What flows, what is sent and what rules read of it go on in the edited network, bit for bit."""

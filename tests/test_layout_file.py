@@ -49,7 +49,7 @@ NUMBERS = st.floats(-2e6, 2e6) | st.integers(-5000, 5000).map(lambda n: n / 1024
 POINTS = st.tuples(NUMBERS, NUMBERS)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.dictionaries(NAMES | st.sampled_from(["yes", "Null", "on", "true"]), POINTS, max_size=5), NAMES)
 def test_numbers_and_names_read_back_exactly(positions: dict[str, tuple[float, float]], network: str) -> None:
     routes = {f"{name} -> {network} (2)": ((0.1, 0.2), point, point, (1e-7, -2e6)) for name, point in positions.items()}
