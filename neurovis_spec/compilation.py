@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -95,11 +95,16 @@ class Compilation:
         return {}
 
     def placed(self, engine: str | None = None, effort: str | None = None) -> Layout:
-        """The layout that pictures are drawn in, by this engine or the spec's; computed once. Raises
-        LayoutRefusalError."""
+        """The layout that pictures are drawn in, by this engine or the spec's; computed once, here or when the same was
+        asked for before (``layout/kept.py``). Raises LayoutRefusalError."""
         key = engine, effort or "normal"
         if key not in self._layouts:
-            self._layouts[key] = self.arranged(engine, effort)
+            from neurovis_spec.layout.kept import kept
+            from neurovis_spec.layout.model import effort_of
+
+            problem = replace(self.problem, effort=effort_of(key[1]))
+            make = partial(self.arranged, engine, effort)
+            self._layouts[key] = kept(problem, engine or self.network.layout.engine, make)
         return self._layouts[key]
 
     def settings_for(self, theme: str | None) -> RenderSettings:

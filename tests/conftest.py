@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
+from neurovis_spec import user_cache
 from neurovis_spec.interrupts import ENDING
 from neurovis_spec.runtime import c_backend
 from neurovis_spec.runtime.backend import ENVIRONMENT_VARIABLE
@@ -26,6 +27,9 @@ for _number in ENDING:
 
 # Array code needs no compiler, and compiles nothing anew for each example: of this process and of those that it starts.
 os.environ[ENVIRONMENT_VARIABLE] = "numpy"
+
+# What is kept for this user is neither read nor written: a test sees what is computed now.
+os.environ[user_cache.ENVIRONMENT_VARIABLE] = "off"
 
 # How long an example takes says something of the machine, not of the program. The examples are the same in each run, so
 # that a change is judged by what it changes; --hypothesis-profile=explore looks for new ones.

@@ -16,13 +16,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
+from neurovis_spec import user_cache
 from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.runtime.environment import for_others
 
@@ -39,7 +39,7 @@ FLAGS = (
 #: Where Linux tells what the processor can do.
 _PROCESSOR = Path("/proc/cpuinfo")
 #: The cache holds at most so many bytes; what was used longest ago goes first.
-MOST_BYTES = 64 << 20
+MOST_BYTES = user_cache.MOST_BYTES
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
@@ -118,12 +118,7 @@ def options() -> tuple[str, ...]:
 
 def folder() -> Path:
     """Where compiled libraries are kept."""
-    named = os.environ.get("XDG_CACHE_HOME", "")
-    try:
-        base = Path(named) if named and Path(named).is_absolute() else Path.home() / ".cache"
-    except RuntimeError:  # there is no home
-        base = Path(tempfile.gettempdir()) / "neurovis-no-home"
-    return base / "neurovis" / "c"
+    return user_cache.folder("c")
 
 
 def place(text: str) -> Path:
@@ -145,7 +140,7 @@ def load(text: str) -> ctypes.CDLL:
     """The library of a text: from the cache, else compiled now. Raises CompilerError."""
     path = place(text)
     try:
-        if not _is_ours(path.parent):
+        if not user_cache.is_ours(path.parent):
             raise OSError("not a folder that this user alone writes to")
         if not path.is_file():  # who opens a pipe waits for ever
             raise OSError("no file")
@@ -157,24 +152,16 @@ def load(text: str) -> ctypes.CDLL:
     return library
 
 
-def _is_ours(cache: Path) -> bool:
-    """Whether nobody else can have put a library there, which would run as this user."""
-    if sys.platform == "win32":
-        return True
-    status = cache.stat()
-    return status.st_uid == os.getuid() and not status.st_mode & 0o022
-
-
 def _compile_and_load(text: str, path: Path) -> ctypes.CDLL:
     """Compile into the cache, or where that cannot be, in a temporary folder."""
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if not _is_ours(path.parent):
+        if not user_cache.is_ours(path.parent):
             raise OSError("not a folder that this user alone writes to")
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".making") as temporary:
             _compile(text, Path(temporary), path.parent / "zig").replace(path)
             library = ctypes.CDLL(str(path))
-        _trim(path.parent, path)
+        user_cache.trim(path.parent, path, MOST_BYTES)
         return library
     except OSError:
         pass
@@ -217,31 +204,3 @@ def _compile(text: str, into: Path, zig: Path) -> Path:
         why = f"({first})" if first else f"with status {result.returncode}"
         raise CompilerError(f"'{made_by.name}' fails {why}")
     return library
-
-
-def _trim(cache: Path, newest: Path) -> None:
-    """Remove what was used longest ago where the cache holds too much."""
-    found: list[tuple[float, int, Path]] = []
-    for path in _entries(cache):
-        try:
-            status = path.stat()
-        except OSError:
-            continue
-        found.append((status.st_mtime, status.st_size, path))
-    total = sum(size for _, size, _ in found)
-    for _, size, path in sorted(found):
-        if total <= MOST_BYTES:
-            return
-        if path != newest:
-            try:
-                path.unlink()
-            except OSError:
-                continue
-            total -= size
-
-
-def _entries(cache: Path) -> Iterable[Path]:
-    try:
-        return [path for path in cache.iterdir() if path.suffix == _SUFFIX]
-    except OSError:
-        return ()
