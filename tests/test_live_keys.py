@@ -33,10 +33,13 @@ def test_a_question_mark_lists_the_keys_that_are_documented(tmp_path: Path) -> N
             await pause(opened)
             await opened.key("?")
             await opened.until(f"{LIST}.open")
-            names = await opened.ask(f"[...{LIST}.querySelectorAll('dt')].map(name => name.textContent)")
-            table = (ROOT / "docs/live.md").read_text(encoding="utf-8").partition("| key |")[2].partition("**")[0]
+            names = await opened.ask(f"[...{LIST}.querySelectorAll('dt kbd')].map(name => name.textContent)")
+            text = (ROOT / "docs/live.md").read_text(encoding="utf-8").partition("| key |")[2].partition("**")[0]
+            table, _, gestures = text.partition("| gesture |")
             assert isinstance(names, list)
             assert sorted(names) == sorted(re.findall(r"`(\S+)`", table))
+            told = await opened.ask(f"[...{LIST}.querySelectorAll('dt span')].map(name => name.textContent)")
+            assert told == re.findall(r"(?m)^\| (?!gesture|---)(.*?) \|", gestures)
             step = await opened.ask("document.querySelector('#told').textContent")
             await opened.key("ArrowRight")
             await opened.key("?")

@@ -31,13 +31,13 @@ EVENTS = "document.querySelector('#events').value"
 
 def test_what_is_declared_has_its_bounds_and_description() -> None:
     head = "neurovis: 1\nname: x\n"
-    given = "parameters: {a: {value: 2, max: 3, description: the gain}, c: 3}\nneurons: {A: {count: c, bias: a}}\n"
+    given = "parameters: {a: {value: 2, max: 3, unit: mV, description: the gain}, c: 3}\nneurons: {A: {count: c, bias: a}}\n"
     assert declared(nv.compile_text(head + given))["parameters"] == [
-        {"name": "a", "value": 2.0, "low": None, "high": 3.0, "description": "the gain"}
+        {"name": "a", "value": 2.0, "low": None, "high": 3.0, "description": "the gain", "unit": "mV"}
     ]
     follows = "parameters: {a: 2, b: {value: 1, min: -a, max: 2*a}}\nneurons: {A: {bias: a + b}}\n"
     assert declared(nv.compile_text(head + follows))["parameters"][1] == {
-        "name": "b", "value": 1.0, "low": -2.0, "high": 4.0, "description": "",
+        "name": "b", "value": 1.0, "low": -2.0, "high": 4.0, "description": "", "unit": "",
     }  # fmt: skip
 
 
@@ -429,7 +429,9 @@ def test_the_page_offers_what_is_taken_and_nothing_else(tmp_path: Path) -> None:
             await opened.key("t")
             assert await opened.ask(offered) == ["set"]
             assert await opened.ask("document.querySelector('#part').hidden")
-            buttons = "[...document.querySelectorAll('#turning button')].filter((one) => one.checkVisibility())"
+            buttons = (
+                "[...document.querySelectorAll('#turning button:not(.shut)')].filter((one) => one.checkVisibility())"
+            )
             assert await opened.ask(f"{buttons}.map((one) => one.textContent)") == ["copy as events", "PNG"]
 
     asyncio.run(main())

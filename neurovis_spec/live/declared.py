@@ -1,8 +1,8 @@
 """Declared: what a user can change in a run (by ``turns``), as data for the page.
 
 In: a compiled network. Out: the parameters that can be set, each with its name, the value that it begins with, its
-bounds where it has some, and its description; the inputs without a source, with the sensors that they are and the
-units of these; and the rules that can be stopped.
+bounds where it has some, its description and its unit; the inputs without a source, with the sensors that they are and
+the units of these; and the rules that can be stopped.
 """
 
 from __future__ import annotations
@@ -60,8 +60,9 @@ def parameters(compiled: Compilation) -> list[dict[str, object]]:
         if name not in network.structural:
             slot = settable.slots[settable.index[name]]
             low, high = (_bound(bound, settable.parameters) for bound in (slot.low, slot.high))
-            about = written[name].about if name in written else ""
-            result.append({"name": name, "value": value, "low": low, "high": high, "description": about})
+            about, unit = (written[name].about, written[name].measure) if name in written else ("", "")
+            words = {"description": about, "unit": unit}
+            result.append({"name": name, "value": value, "low": low, "high": high, **words})
     return result
 
 

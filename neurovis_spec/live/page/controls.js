@@ -64,8 +64,9 @@ export class Controls {
   /** How the run stands. @param {Status} status */
   status(status) {
     this.playing = status.playing;
-    this.play.textContent = status.playing ? '❚❚' : '▶';
-    this.play.setAttribute('aria-label', status.playing ? 'pause' : 'play');
+    const does = status.playing ? 'pause' : 'play';
+    this.play.setAttribute('aria-label', does);
+    this.play.querySelector('use')?.setAttribute('href', `#i-${does}`);
     this.speed.value = status.speed;
     this.rate.status(status);
     this.owner = status.owner;

@@ -1,5 +1,5 @@
 /**
- * Keys: what each does, and the list of them.
+ * Keys: what each does, and the list of them, with what the pointer and fingers do.
  */
 
 /** What a key does, in words, and what does it.
@@ -34,19 +34,80 @@ export function followKeys(keys) {
   });
 }
 
-/** Show the list of keys, or close it. @param {HTMLDialogElement} dialog @param {Keys} keys */
+/** What belongs together: its keys, and what is done with the pointer or with fingers. What is in no group comes last.
+ * @type {[string, string[], [string, string][]][]} */
+const GROUPS = [
+  [
+    'transport',
+    [' ', 'ArrowRight', 'ArrowLeft', 'Home', 'e', 'E', 'b', '<', '>'],
+    [
+      ['drag the timeline', 'go to a step'],
+      ['wheel over the timeline', 'show more of the past, or less'],
+      ['press a curve', 'go to the step there'],
+    ],
+  ],
+  [
+    'looking',
+    ['+', '-', '0', 'h', 'j', 'k', 'l', 'v'],
+    [
+      ['wheel, pinch', 'come closer, go further away'],
+      ['drag, two fingers', 'move the picture'],
+      ['point', 'read name and value'],
+      ['click a closed box', 'go there'],
+    ],
+  ],
+  [
+    'holding',
+    [']', '[', 'Escape', 'p', '/', 'o'],
+    [
+      ['click, tap', 'hold a neuron or a connection'],
+      ['click beside', 'let go'],
+    ],
+  ],
+  ['views', ['m', 'g', 'y'], []],
+  [
+    'changing',
+    ['t', 'shift+←', 'shift+→', 'shift+↑', 'shift+↓', 'z'],
+    [
+      ['drag a neuron', 'put it elsewhere (with a finger: hold it first)'],
+      ['shift and drag up, down', 'clamp a neuron to a value'],
+      ['double click a slider', 'reset it (or Delete)'],
+    ],
+  ],
+];
+
+/** A row of a list. @param {string} tag @param {string} name @param {string} words @returns {HTMLElement[]} */
+function row(tag, name, words) {
+  const [term, shown, what] = ['dt', tag, 'dd'].map((one) => document.createElement(one));
+  shown.textContent = name;
+  what.textContent = words;
+  term.append(shown);
+  return [term, what];
+}
+
+/** Show the list of keys and gestures, or close it. @param {HTMLDialogElement} dialog @param {Keys} keys */
 export function listKeys(dialog, keys) {
   if (dialog.open) {
     dialog.close();
     return;
   }
-  const list = /** @type {HTMLElement} */ (dialog.querySelector('dl'));
+  const grouped = GROUPS.flatMap(([, some]) => some),
+    rest = Object.keys(keys).filter((key) => !grouped.includes(key));
+  /** @type {typeof GROUPS} */
+  const all = [...GROUPS, ['more', rest, []]];
+  const list = /** @type {HTMLElement} */ (dialog.querySelector('#keylist'));
   list.replaceChildren(
-    ...Object.entries(keys).flatMap(([key, [words]]) => {
-      const [name, what] = ['dt', 'dd'].map((tag) => document.createElement(tag));
-      name.textContent = CALLED[key] || key;
-      what.textContent = words;
-      return [name, what];
+    ...all.flatMap(([group, some, gestures]) => {
+      const rows = [
+        ...some.filter((key) => key in keys).flatMap((key) => row('kbd', CALLED[key] || key, keys[key][0])),
+        ...gestures.flatMap(([name, words]) => row('span', name, words)),
+      ];
+      if (!rows.length) return [];
+      const [section, heading, terms] = ['section', 'h3', 'dl'].map((tag) => document.createElement(tag));
+      heading.textContent = group;
+      terms.append(...rows);
+      section.append(heading, terms);
+      return [section];
     }),
   );
   dialog.showModal();

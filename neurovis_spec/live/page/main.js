@@ -13,6 +13,7 @@ import { listKeys } from './keys.js';
 import { Marks } from './marks.js';
 import { Matrix } from './matrix.js';
 import { Outline } from './outline.js';
+import { arrangePanels, greet } from './panels.js';
 import { under } from './pick.js';
 import { followFingers } from './pinch.js';
 import { Placing } from './place.js';
@@ -284,6 +285,8 @@ part('film').onclick = () => withNumber(part('seconds'), (seconds) => link.ask('
 part('help').onclick = help;
 part('matrix').onclick = () => choose(!matrix);
 part('shut').onclick = help;
+arrangePanels();
+greet(part('hint'));
 Object.assign(controls.keys, {
   '+': ['come closer', () => nearer(1.25)],
   '-': ['go further away', () => nearer(0.8)],
@@ -299,13 +302,13 @@ Object.assign(controls.keys, {
   k: ['see more above', () => pan(0, 0.1)],
   l: ['see more on the right', () => pan(-0.1, 0)],
   '/': ['search by name', () => outline.search()],
-  o: ['open or close the outline', () => outline.toggle()],
+  o: ['open or close the panel of search', () => outline.toggle()],
   v: ['say what is held with its value, or how the run stands', tellAll],
-  t: ['open or close the panel for turning', () => turning.toggle()],
+  t: ['open or close the panel of parameters', () => turning.toggle()],
   y: ['open or close the panel of the body', () => body.toggle()],
   m: ['the matrix of the weights in place of the picture, and back', () => choose(!matrix)],
-  g: ['each group as one glyph, with the pathways between them, and back', () => turning.appearance.toggle()],
-  p: ['pin the strip of what is held, or unpin it', () => strips.toggle()],
+  g: ['each group as one node, with the pathways between them, and back', () => turning.appearance.toggle()],
+  p: ['pin the curve of what is held, or unpin it', () => strips.toggle()],
   '<': ['show more of the past', () => scrubber.more(1)],
   '>': ['show less of the past', () => scrubber.more(-1)],
   Escape: [
@@ -322,5 +325,5 @@ Object.assign(controls.keys, {
   'shift+↑': ['put it further up', () => placing.step(attention.held, 0, -1)],
   'shift+↓': ['put it further down', () => placing.step(attention.held, 0, 1)],
   z: ['undo the last placing', () => placing.undo()],
-  '?': ['list the keys, or close the list', help],
+  '?': ['list keys and gestures, or close the list', help],
 });

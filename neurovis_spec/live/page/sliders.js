@@ -47,7 +47,7 @@ export class Sliders {
 
   /** A row. @param {Row} entry @param {string} id @param {Given} given */
   add(entry, id, given) {
-    const { name, value, description, log } = entry,
+    const { name, value, description, log, unit } = entry,
       [min, max] = range(entry).map(log ? Math.log2 : Number);
     const slid = () => (log ? Number((2 ** Number(slider.value)).toPrecision(3)) : Number(slider.value));
     const row = document.createElement('div'),
@@ -62,7 +62,13 @@ export class Sliders {
     if (entry.low !== null) field.min = String(entry.low);
     if (entry.high !== null) field.max = String(entry.high);
     label.htmlFor = slider.id;
-    label.textContent = name;
+    label.textContent = label.title = name;
+    if (unit) {
+      const measure = document.createElement('span');
+      measure.className = 'unit';
+      measure.textContent = ` ${unit}`;
+      label.append(measure);
+    }
     about.textContent = description;
     field.setAttribute('aria-label', `${name}, as a number`);
     if (log) this.log.add(name);
@@ -84,7 +90,7 @@ export class Sliders {
       this.pressed = true;
       if (event.key === 'Delete') given(null, false);
     };
-    row.append(label, document.createElement('span'), slider, field, ...(description ? [about] : []));
+    row.append(label, slider, field, ...(description ? [about] : []));
     this.inputs.set(name, [slider, field]);
     this.place.append(row);
     this.show({ [name]: value });
