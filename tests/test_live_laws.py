@@ -37,7 +37,22 @@ from neurovis_spec.live.saving import told_by
 from neurovis_spec.live.show import Show
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Seen, Source, SourceError
-from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, fed_by, rules, turn
+from neurovis_spec.live.turns import (
+    Feed,
+    Hold,
+    Learn,
+    Lesion,
+    Mend,
+    Release,
+    Set,
+    Turn,
+    Turned,
+    Weigh,
+    fed_by,
+    rules,
+    taken,
+    turn,
+)
 from neurovis_spec.live.view import View, view_of
 from neurovis_spec.notebook import widget as notebook
 from neurovis_spec.runtime.recording import Snapshot
@@ -179,6 +194,7 @@ class Kind:
         neurons, parts = st.sampled_from([*self.neurons, "Q"]), st.sampled_from([*self.neurons, *self.connections])
         chosen: list[st.SearchStrategy[Turn]] = [st.builds(Hold, neurons, value, moving), st.builds(Release, neurons)]
         chosen += [st.builds(Lesion, parts), st.builds(Mend, parts)]
+        chosen.append(st.builds(Weigh, st.sampled_from([*self.connections, "A1"]), value, moving))
         names = st.sampled_from([*self.parameters, "q"])
         chosen.append(st.builds(lambda name, one, drag: Set({name: one}, drag), names, value, moving))
         if self.rules:
@@ -322,7 +338,8 @@ class Model:
     def turned(self, step: int, what: Turn) -> None:
         """A turn was taken."""
         self.forget(step)
-        self.turns.append((step, what))
+        before = [Turned(at, one) for at, one in self.turns]
+        self.turns = [(entry.step, entry.turn) for entry in taken(before, Turned(step, what))]
         del self._stands[step:]
 
     def forget(self, step: int) -> None:
@@ -410,7 +427,7 @@ def do(source: SimulatedSource, model: Model, doing: Doing) -> SimulatedSource:
         case ("edit", _):
             source = carried(source, Fragile(model.compiled.network))
             model.forget(source.step)
-        case Set() | Feed() | Hold() | Release() | Lesion() | Mend() | Learn():
+        case Set() | Feed() | Hold() | Release() | Lesion() | Mend() | Learn() | Weigh():
             with suppress(SourceError):
                 source.turn(doing)
                 model.turned(source.step, doing)
@@ -557,6 +574,7 @@ MESSAGES = st.one_of(
     st.builds(lambda part, kind: {"type": kind, "part": part},
               st.sampled_from(["A", "B", "A -> B", "A1 -> A2", "->", "Q"]), st.sampled_from(["lesion", "mend"])),
     st.builds(lambda on: {"type": "learn", "connections": "A -> B", "on": on}, st.booleans()),
+    st.builds(lambda value: {"type": "weigh", "connections": "A1 -> A2", "value": value}, st.sampled_from([0, 0.5])),
     st.builds(lambda value: {"type": "hold", "neurons": "A", "value": value}, st.sampled_from([0, 0.5])),
     st.builds(lambda values: {"type": "feed", "name": "push", "values": values}, st.sampled_from([[], [1], [1, 2]])),
     st.sampled_from([{"type": "release", "neurons": "A"}, {"type": "branch"}, {"type": "restart"}, {"type": "pause"},

@@ -21,7 +21,7 @@ from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.saving import film, picture, recording, steps_for, told_by
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError
-from neurovis_spec.live.turns import Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned
+from neurovis_spec.live.turns import Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh
 from neurovis_spec.live.view import view_of
 from neurovis_spec.runtime.recording import Recording
 
@@ -150,7 +150,7 @@ def turns(parts: tuple[list[str], ...]) -> st.SearchStrategy[Turn]:
     return st.one_of(
         st.builds(lambda name, one: Set({name: one}), parameters, value),
         st.builds(Hold, neurons, value), st.builds(Release, neurons), st.builds(Learn, rules, st.booleans()),
-        st.builds(Lesion, either), st.builds(Mend, either),
+        st.builds(Lesion, either), st.builds(Mend, either), st.builds(Weigh, connections, value),
     )  # fmt: skip
 
 
@@ -168,6 +168,8 @@ def events(turned: Sequence[Turned]) -> str:
                 last[entry.step + 1, "part", part] = entry.turn
             case Learn(connections):
                 last[entry.step + 1, "learn", connections] = entry.turn
+            case Weigh(connections):
+                last[entry.step + 1, "weigh", connections] = entry.turn
     lines, all = [], list(last.items())
     for place, ((at, _, name), what) in enumerate(all):
         match what:
@@ -182,6 +184,8 @@ def events(turned: Sequence[Turned]) -> str:
                 lines.append(f"{{at: {at}, lesion: {name}}}")
             case Mend():
                 lines.append(f"{{at: {at}, mend: {name}}}")
+            case Weigh(_, value):
+                lines.append(f"{{at: {at}, set: {{{name}: {value!r}}}}}")
             case Learn(_, on):
                 lines.append(f"{{at: {at}, learning: {{{name}: {str(on).lower()}}}}}")
     return "".join(f"  - {line}\n" for line in lines)
@@ -223,7 +227,7 @@ def test_what_is_saved_is_the_run_of_the_spec_with_the_events_that_are_copied(
         saved, again = nv.load(tmp_path / "x.npz"), compile(text + copied)
         run = again.run(source.step + 1)
         last = [entry.turn for entry in source.turned if entry.step == source.step]
-        at_the_end = any(isinstance(what, Set | Lesion | Mend) for what in last)
+        at_the_end = any(isinstance(what, Set | Lesion | Mend | Weigh) for what in last)
         equal(saved, run, AFTER if at_the_end else ())
         if at_the_end:  # what was turned at the step that is shown is true after it
             simulator = again.simulator()

@@ -113,6 +113,21 @@ def test_what_is_held_is_clamped_lesioned_and_mended_and_taken_back(tmp_path: Pa
             await press(opened, "document.querySelector('#turn')")
             await opened.until("document.querySelector('#parted').textContent == 'K2 -> O'")
             assert await opened.ask("document.querySelector('#clamps').hidden")
+            weigh, number = "document.querySelector('#weigh')", "document.querySelector('#weight [type=number]')"
+            await opened.until(f"{weigh}?.checkVisibility() && Number({number}.value) != 0")
+            before = await opened.ask(f"{number}.value")
+            assert f"weight {float(str(before)):+.6g}".replace("-", "−") in await told(opened, "K2 → O")
+            await opened.ask(f"{weigh}.value = 0.4; {weigh}.onchange()")
+            await turned(opened, "weight of K2 -> O = 0.4")
+            assert ", set: {K2 -> O: 0.4}}" in str(await opened.ask(EVENTS))
+            await opened.ask("document.querySelector('#step').click()")
+            await opened.until(f"Math.abs({number}.value - 0.4) < 0.02 && {TIP}.textContent.includes('weight +0.')")
+            await opened.ask("document.querySelector('#turned button').click()")
+            await opened.until(f"{TURNED}.length == 2")
+            back = str(await opened.ask(f"{TURNED}[0]")).partition(" = ")[2]
+            assert abs(float(back) - float(str(before))) < 0.02, "what its rule had made of it"
+            await opened.ask("document.querySelector('#restart').click()")
+            await turned(opened)
             await press(opened, "document.querySelector('#lesion')")
             await turned(opened, "lesion K2 -> O")
             await opened.until(f"{TIP}.textContent.endsWith('lesioned')")

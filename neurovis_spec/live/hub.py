@@ -169,7 +169,7 @@ class Hub:
             self._reader = self._loop.call_at(self._rest, self._read_traces)
 
     def _read_traces(self) -> None:
-        """Read traces for whoever has waited longest; the more time of the processor it takes the longer is the rest."""
+        """Read traces for whoever has waited longest; the more of the processor it takes the longer is the rest."""
         begun, shown = time.thread_time(), self._shown
         client, self._reader = self._waiting.popleft(), None
         wanted, client.wanted = client.wanted, None

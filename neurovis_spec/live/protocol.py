@@ -50,7 +50,7 @@ from neurovis_spec.live.history import Bins, Range
 from neurovis_spec.live.run import Status
 from neurovis_spec.live.saving import MOST_SECONDS
 from neurovis_spec.live.source import Drawn, Reach
-from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turned
+from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh
 from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
@@ -133,7 +133,7 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         parameters={name: value for name, value in status.parameters.items() if math.isfinite(value)},
         fed={name: list(values) for name, values in status.fed.items()},
         learning=dict(status.learning),
-        turned=[_turned(entry) for entry in status.turned[-_LISTED:]],
+        turned=[_listed(entry) for entry in status.turned[-_LISTED:]],
         events=list(status.events[:_LISTED]),
         appearance=asdict(status.appearance),
         backend=status.backend,
@@ -158,9 +158,20 @@ def _future(future: Future) -> dict[str, object]:
     return {"number": future.number, "at": future.at, "last": future.last, "turned": own, "within": within}
 
 
+def _listed(entry: Turned) -> dict[str, object]:
+    """A turn with its number, what takes it back, and of a drag the step at which it began."""
+    more = {} if entry.since is None else {"since": entry.since}
+    return {**_turned(entry), "number": entry.number, "back": entry.back and _message(entry.back), **more}
+
+
 def _turned(entry: Turned) -> dict[str, object]:
     """A turn, and the step after which it was taken."""
-    return {"step": entry.step, "type": type(entry.turn).__name__.lower(), **asdict(entry.turn)}
+    return {"step": entry.step, **_message(entry.turn)}
+
+
+def _message(turn: Turn) -> dict[str, object]:
+    """A turn as a client asks for it."""
+    return {"type": type(turn).__name__.lower(), **asdict(turn)}
 
 
 def values_message(step: int, values: Mapping[str, float]) -> str:
@@ -418,6 +429,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "lesion": ({"part": _name}, Lesion),
     "mend": ({"part": _name}, Mend),
     "learn": ({"connections": _name, "on": _truth}, Learn),
+    "weigh": ({"connections": _name, "value": _number, "moving": _truth}, Weigh),
     "place": ({"neuron": _name, "at": _point, "done": _truth}, PlaceNeuron),
     "unplace": ({}, Unplace),
     "save": ({"into": _one_of("spec", "file")}, Save),

@@ -16,17 +16,17 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, frozen
 from neurovis_spec.compiler.events.changes import Change
-from neurovis_spec.compiler.events.settable import ParameterFormula
+from neurovis_spec.compiler.events.settable import WEIGHTS, Binding, ParameterFormula, Settable, Slot
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.language.expressions.tree import Number
+from neurovis_spec.language.expressions.tree import Name, Number
 from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen, Source
-from neurovis_spec.live.turns import Lesion, Mend, Set, Turned
+from neurovis_spec.live.turns import Lesion, Mend, Set, Turned, Weigh
 from neurovis_spec.live.view import View
 from neurovis_spec.runtime.columns import Numbers, Probe, columns_of, recording_of
 from neurovis_spec.runtime.fitting import with_spikes
 from neurovis_spec.runtime.names import names_of
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.references import find_parts
+from neurovis_spec.runtime.references import find_connections, find_parts
 from neurovis_spec.runtime.rows import After, Rows
 from neurovis_spec.scene import Film
 from neurovis_spec.scene.figure import PAGE, with_body
@@ -40,13 +40,18 @@ MOST_STEPS, _NUMBERS, MOST_SECONDS = 10_000, 8_000_000, 60
 
 
 def as_turned(network: Network, turned: Sequence[Turned]) -> Network:
-    """The network with the parameters that were set by hand, and the lesions, among what changes; by its hash it is
-    the one that it was."""
+    """The network with the parameters and weights that were set by hand, and the lesions, among what changes; by its
+    hash it is the one that it was."""
+    network = _with_weights(network, [entry.turn.connections for entry in turned if isinstance(entry.turn, Weigh)])
+    slots = {slot.name: place for place, slot in enumerate(network.settable.slots)}
     changes, names = {change.at: change for change in network.changes}, names_of(network)
     for at, what in ((entry.step + 1, entry.turn) for entry in turned):
         before = changes.get(at, Change(at))
         if isinstance(what, Set):
             changes[at] = before._replace(parameters=(*before.parameters, *_parameters(network, what)))
+        elif isinstance(what, Weigh):
+            given = slots[_slot_of(what.connections)], ParameterFormula(Number(what.value), {})
+            changes[at] = before._replace(parameters=(*before.parameters, given))
         elif isinstance(what, Lesion | Mend):  # one that is mended before a step is made is none
             neurons, connections = find_parts(network, what.part, names)
             joined = np.union1d if isinstance(what, Lesion) else np.setdiff1d
@@ -57,6 +62,27 @@ def as_turned(network: Network, turned: Sequence[Turned]) -> Network:
     if len(changes) == len(network.changes) and all(change is changes[change.at] for change in network.changes):
         return network
     return replace(network, changes=tuple(changes[at] for at in sorted(changes)))
+
+
+def _slot_of(connections: str) -> str:
+    """What the slot is called of a weight that was set by hand; no parameter is."""
+    return f"by hand: {connections}"
+
+
+def _with_weights(network: Network, connections: Sequence[str]) -> Network:
+    """The network with a slot for the weight of each of these, as events have them."""
+    names, before = names_of(network), network.settable
+    slots, bindings = [*before.slots], [*before.bindings]
+    for name in dict.fromkeys(connections):
+        own = find_connections(network, name, names)
+        members = frozen(network.connections.with_tied(network.connections.with_twins(own))[0])
+        formula = ParameterFormula(Name("weight"), {"weight": len(slots)})
+        bindings.append(Binding(formula, weights=True, indices=members, array=WEIGHTS, places=members))
+        slots.append(Slot(_slot_of(name), 0.0))
+    if len(slots) == len(before.slots):
+        return network
+    settable: Settable = replace(before, slots=(*slots,), bindings=(*bindings,), of_events=before.own_count)
+    return replace(network, settable=settable)
 
 
 def _parameters(network: Network, what: Set) -> tuple[tuple[int, ParameterFormula], ...]:

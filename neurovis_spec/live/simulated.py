@@ -14,7 +14,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
-from itertools import zip_longest
 from operator import attrgetter
 
 import numpy as np
@@ -29,17 +28,19 @@ from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, dr
 from neurovis_spec.live.turns import (
     TURNS,
     Feed,
-    Hold,
     Lesion,
     Mend,
     Set,
     Turn,
     Turned,
+    Weigh,
     carried_out,
     fed_by,
+    opposite,
     rules,
-    same_value,
+    taken,
     turn,
+    without_drags,
 )
 from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.quantities import Quantities
@@ -81,6 +82,8 @@ class SimulatedSource:
         self._origin = simulation.state() if origin is None else origin
         #: the other futures of this run
         self.futures = Futures()
+        #: how many turns were taken
+        self._taken = 1 + max((entry.number for entry in turned), default=-1)
         self._begin(self._origin if begin is None else begin, turned, fed or {})
         self.body = drawn(simulation.skeleton, tuple(simulation.sensors), self._seen.snapshot.pose)
 
@@ -118,9 +121,9 @@ class SimulatedSource:
     @property
     def turned(self) -> tuple[Turned, ...]:
         """The turns that were taken up to the current step, in order."""
-        taken = self._turned[: bisect_right(self._turned, self.step, key=attrgetter("step"))]
-        if len(self._listed[0]) != len(taken):
-            self._listed = taken, _without_drags(taken)
+        until = self._turned[: bisect_right(self._turned, self.step, key=attrgetter("step"))]
+        if len(self._listed[0]) != len(until):
+            self._listed = until, without_drags(until)
         return self._listed[1]
 
     @property
@@ -171,7 +174,9 @@ class SimulatedSource:
     def after(self) -> After:
         """What is true after the current step, with what was turned at it; weights of all connections (m,)."""
         turned = self._turned[bisect_left(self._turned, self.step, key=attrgetter("step")) :]
-        by_hand = any(entry.step == self.step and isinstance(entry.turn, Set | Lesion | Mend) for entry in turned)
+        by_hand = any(
+            entry.step == self.step and isinstance(entry.turn, Set | Lesion | Mend | Weigh) for entry in turned
+        )
         return self._simulation.after() if by_hand or self._ended is None else self._ended
 
     def advance(self) -> bool:
@@ -312,18 +317,24 @@ class SimulatedSource:
         """Take a turn, from the next step on. Raises SourceError."""
         self._check_going()
         with self._whole():
+            back = self._opposite(what)
             refused = self._turn(what)
             if not refused:
                 kept = self._kept()
                 self.branch()
                 self._keep(kept)
-                before = self._turned
-                if before and before[-1].step == self.step and same_value(before[-1].turn, what):
-                    before = before[:-1]
-                self._turned = [*before, Turned(self.step, what)]
+                self._turned = taken(self._turned, Turned(self.step, what, self._taken, back))
+                self._taken += 1
                 self._seen = self._turned_seen()
         if refused:
             raise SourceError(refused)
+
+    def _opposite(self, what: Turn) -> Turn:
+        """What takes a turn back that is about to be taken."""
+        weight = None
+        if isinstance(what, Weigh):
+            weight = self._simulation.weight_of(what.connections)
+        return opposite(what, self._turned, self.parameters, self._fed, weight)
 
     def _turn(self, what: Turn) -> str:
         """Apply a turn; why it cannot be, and then nothing has changed."""
@@ -334,7 +345,18 @@ class SimulatedSource:
                 turn(self._simulation, what)
         except (ValueError, KeyError) as error:
             return str(error)
+        if isinstance(what, Set):
+            self._weigh_again()
         return ""
+
+    def _weigh_again(self) -> None:
+        """Of what is turned at this step weights come last. Raises SourceError, and then something has changed."""
+        for entry in self._turned[bisect_left(self._turned, self.step, key=attrgetter("step")) :]:
+            if entry.step == self.step and isinstance(entry.turn, Weigh):
+                try:
+                    turn(self._simulation, entry.turn)
+                except ParameterError as error:
+                    raise SourceError(str(error)) from None
 
     def _turned_seen(self) -> Seen:
         """What is seen of this step after a turn: what is lesioned and clamped is that of the next one."""
@@ -380,14 +402,3 @@ class SimulatedSource:
             sent = self._fading.sent if self._fading.sends else sent
         snapshot = Snapshot(step, activity, weights, previous, seen, pose, run.sensed, shown, sent, ends)
         return Seen(snapshot, *lesioned, held, run.probed(self._probe))
-
-
-def _without_drags(turned: Sequence[Turned]) -> tuple[Turned, ...]:
-    """The turns without the values that a slider only passed while it was dragged."""
-    pairs = zip_longest(turned, turned[1:])
-    return tuple(one for one, after in pairs if after is None or not _dragged_on(one.turn, after.turn))
-
-
-def _dragged_on(turn: Turn, after: Turn) -> bool:
-    """Whether a slider was being dragged when ``turn`` was taken, and ``after`` is the next value of the same drag."""
-    return isinstance(turn, Set | Feed | Hold) and turn.moving and same_value(turn, after)

@@ -1,4 +1,4 @@
-"""Turns: the changes that a user makes to a network while it runs: set a parameter, feed an input, clamp, lesion, …
+"""Turns: the changes that a user makes to a network while it runs: set a parameter, a weight, feed an input, clamp, …
 
 In: names and values, as a client sends them. Out: frozen values, one for each change; ``turn`` applies one to a
 Simulation. While a slider is dragged its values are ``moving``: the whole drag counts as one turn, to its last value.
@@ -8,7 +8,7 @@ Simulation. While a slider is dragged its values are ``moving``: the whole drag 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -76,22 +76,40 @@ class Learn:
     on: bool
 
 
-Turn: TypeAlias = Set | Feed | Hold | Release | Lesion | Mend | Learn
+@dataclass(frozen=True, slots=True)
+class Weigh:
+    """Connections have this weight from now on, until a rule or a parameter changes it."""
+
+    connections: str
+    value: float
+    moving: bool = False
+
+
+Turn: TypeAlias = Set | Feed | Hold | Release | Lesion | Mend | Learn | Weigh
 #: the messages that ask for them
-TURNS: Final = frozenset(("set", "feed", "hold", "release", "lesion", "mend", "learn"))
+TURNS: Final = frozenset(("set", "feed", "hold", "release", "lesion", "mend", "learn", "weigh"))
 
 
 @dataclass(frozen=True, slots=True)
 class Turned:
     """A turn that was taken at ``step``: it has its effect from the next one on. Of several values that were given to
-    one thing at the same step, or in one drag, only the last is kept."""
+    one thing at the same step, or in one drag, only the last is kept. Of a run each has its ``number``; ``back`` takes
+    it back, and a drag begins at the step ``since``."""
 
     step: int
     turn: Turn
+    number: int = field(default=0, compare=False)
+    back: Turn | None = field(default=None, compare=False)
+    since: int | None = field(default=None, compare=False)
+
+    def after(self, before: Turned) -> Turned:
+        """The same in place of one before, of which it is the next value."""
+        since = before.step if before.since is None else before.since
+        return replace(self, number=before.number, back=before.back, since=None if since == self.step else since)
 
 
 def same_value(one: Turn, other: Turn) -> bool:
-    """Whether both set the same parameters, feed the same input or clamp the same neurons."""
+    """Whether both set the same parameters or the same weights, feed the same input or clamp the same neurons."""
     match one, other:
         case (Set(), Set()):
             return one.values.keys() == other.values.keys()
@@ -99,10 +117,63 @@ def same_value(one: Turn, other: Turn) -> bool:
             return one.name == other.name
         case (Hold(), Hold()):
             return one.neurons == other.neurons
+        case (Weigh(), Weigh()):
+            return one.connections == other.connections
     return False
 
 
-def turn(simulation: Simulation, what: Set | Hold | Release | Lesion | Mend | Learn) -> None:
+def taken(turned: Sequence[Turned], one: Turned) -> list[Turned]:
+    """What was turned, with another turn behind it, in place of one before that gave the same thing a value at the same
+    step. Of what is turned at one step weights come last, as events of a step set parameters first: a weight that
+    follows a parameter has what was given to itself."""
+    before, later = list(turned), list[Turned]()
+    while isinstance(one.turn, Set) and before and before[-1].step == one.step and isinstance(before[-1].turn, Weigh):
+        later.insert(0, before.pop())
+    if before and before[-1].step == one.step and same_value(before[-1].turn, one.turn):
+        one = one.after(before.pop())
+    return [*before, one, *later]
+
+
+def without_drags(turned: Sequence[Turned]) -> tuple[Turned, ...]:
+    """The turns without the values that a slider only passed while it was dragged."""
+    found = list[Turned]()
+    for one in turned:
+        dragged = found and isinstance(found[-1].turn, Set | Feed | Hold | Weigh) and found[-1].turn.moving
+        if dragged and same_value(found[-1].turn, one.turn):
+            one = one.after(found.pop())
+        found.append(one)
+    return tuple(found)
+
+
+def opposite(
+    what: Turn,
+    turned: Sequence[Turned],
+    parameters: Mapping[str, float],
+    fed: Mapping[str, tuple[float, ...]],
+    weight: float | None = None,
+) -> Turn:
+    """What takes a turn back that is about to be taken, after what was ``turned`` before; ``parameters`` and what is
+    ``fed`` are those of now, ``weight`` is that of connections that are given one."""
+    match what:
+        case Set():
+            return Set({name: parameters.get(name, value) for name, value in what.values.items()})
+        case Feed():
+            return Feed(what.name, fed.get(what.name, ()))
+        case Hold() | Release():
+            clamps = (entry.turn for entry in reversed(turned) if isinstance(entry.turn, Hold | Release))
+            before = next((one for one in clamps if one.neurons == what.neurons), None)
+            return Hold(what.neurons, before.value) if isinstance(before, Hold) else Release(what.neurons)
+        case Lesion():
+            return Mend(what.part)
+        case Mend():
+            return Lesion(what.part)
+        case Learn():
+            return Learn(what.connections, not what.on)
+        case Weigh():
+            return Weigh(what.connections, what.value if weight is None else weight)
+
+
+def turn(simulation: Simulation, what: Set | Hold | Release | Lesion | Mend | Learn | Weigh) -> None:
     """Apply a turn. Raises ParameterError or another ValueError, or KeyError, and then nothing has changed."""
     match what:
         case Set():
@@ -117,6 +188,8 @@ def turn(simulation: Simulation, what: Set | Hold | Release | Lesion | Mend | Le
             simulation.mend(what.part)
         case Learn():
             simulation.learning(what.connections, what.on)
+        case Weigh():
+            simulation.set_weight(what.connections, what.value)
 
 
 def fed_by(network: Network, fed: Mapping[str, tuple[float, ...]], what: Feed) -> dict[str, tuple[float, ...]]:

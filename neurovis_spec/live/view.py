@@ -26,6 +26,7 @@ from neurovis_spec.live.declared import declared
 from neurovis_spec.live.drawing import Moved, content, moved
 from neurovis_spec.live.history import Members
 from neurovis_spec.live.source import Mask, Seen
+from neurovis_spec.live.weights import ranges_of
 from neurovis_spec.runtime.quantities import Glyphs, Listed, Quantities
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import Scene
@@ -245,7 +246,7 @@ def view_of(
     names = {"named": [list(one) for one in listed.lists], "names": listed.of.tolist() if len(quantities) else []}
     curves = curves_of(drawn)
     begins = {"curves": [asdict(curve) for curve in curves.shown]}
-    more = {**declared(compiled), **names, **begins, "themes": list(THEMES), "themed": themed}
+    more = {**declared(compiled), **ranges_of(drawn), **names, **begins, "themes": list(THEMES), "themed": themed}
     words = content(drawn.network, scene, rows, constants, more)
     otherwise = otherwise or partial(view_of, compiled, gains, theme, engine, layout=layout)
     anew = partial(_planned, stands, seen, settings)

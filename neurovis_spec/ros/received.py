@@ -21,7 +21,7 @@ from neurovis_spec.live.clock import FRAMES
 from neurovis_spec.live.futures import Futures
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.source import NOTHING, Capabilities, Mask, Reach, Seen, SourceError
-from neurovis_spec.live.turns import Turn, Turned, same_value
+from neurovis_spec.live.turns import Turn, Turned, opposite, taken
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.scene.fading import Fading
@@ -318,8 +318,8 @@ class ReceivedSource:
         """Take a turn, from the network's next step on. Raises SourceError, also where the network takes none."""
         if self._steering is None:
             raise SourceError("the network runs elsewhere: it takes no turns")
+        before = self._turned
+        back = opposite(turn, before, self._steering.parameters, self._steering.fed)
         self._steering.turn(turn)
-        step, before = self.reach.last, self._turned
-        if before and before[-1].step == step and same_value(before[-1].turn, turn):
-            before = before[:-1]
-        self._turned = (*before[-_MOST_TURNS:], Turned(step, turn))
+        one = Turned(self.reach.last, turn, 1 + max((entry.number for entry in before), default=-1), back)
+        self._turned = tuple(taken(before[-_MOST_TURNS:], one))

@@ -16,7 +16,7 @@ import numpy as np
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.source import Mask, SourceError
-from neurovis_spec.live.turns import TURNS, Feed, Set, Turn, carried_out, fed_by, rules, turn
+from neurovis_spec.live.turns import TURNS, Feed, Set, Turn, Weigh, carried_out, fed_by, rules, turn
 from neurovis_spec.ros.middleware import Node
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 
@@ -24,7 +24,8 @@ from neurovis_spec.runtime.simulation import ParameterError, Simulation
 class RunSteering:
     """Turns a run; ``lock`` is held while a step is made."""
 
-    takes = TURNS
+    #: who looks on is told the weights that rules and events change, and no others
+    takes = TURNS - {"weigh"}
 
     def __init__(self, simulation: Simulation, lock: Lock) -> None:
         self._simulation, self._lock = simulation, lock
@@ -57,7 +58,9 @@ class RunSteering:
             return *self._simulation.lesioned, self._simulation.held
 
     def turn(self, what: Turn) -> None:
-        """Take a turn, from the next step on. Raises SourceError."""
+        """Take a turn, from the next step on. Raises SourceError, also for one that gives a weight."""
+        if isinstance(what, Weigh):
+            raise SourceError("weights are not set by hand here")
         with self._lock:
             try:
                 if isinstance(what, Feed):

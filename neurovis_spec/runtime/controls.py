@@ -15,14 +15,15 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Change, Held
-from neurovis_spec.compiler.events.patch import Patcher
+from neurovis_spec.compiler.events.patch import Patcher, PatchError
+from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Key
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.runtime.beginning import Beginnings
 from neurovis_spec.runtime.presynaptic import remembering
 from neurovis_spec.runtime.signals import signal_layout
-from neurovis_spec.runtime.state import Conditions, State
+from neurovis_spec.runtime.state import Conditions, State, have_own_signals
 
 
 def lose(network: Network, state: State, connections: IntArray) -> None:
@@ -84,6 +85,26 @@ class Controls:
         if now.held.active:
             now.held.follow(patch.changed, now.parameters, self.by)
             self.hold(now)
+
+    def weigh(self, state: State, connections: IntArray, value: float) -> None:
+        """Give connections this weight, as an event that sets it does, and what has the same weight as they: their
+        twins, and those that are tied to them. What is under way has left with the weight of before. Raises PatchError
+        for one beyond its bounds."""
+        network, variables = self.network.connections, self.network.settable.variables
+        members, _ = network.with_tied(network.with_twins(connections))
+        for key, column, beyond, word in (
+            (LOW, network.low, np.less, "below"),
+            (HIGH, network.high, np.greater, "above"),
+        ):
+            edges = column[members]
+            if key in variables:
+                start, size = variables[key]
+                edges = state.conditions.variables[start + (members if size > 1 else 0)]
+            if beyond(value, edges).any():
+                raise PatchError(f"a weight would be {word} its bound of {float(np.max(edges)):g}", frozenset())
+        if not state.own_signals and signal_layout(self.network).shares[members].any():
+            have_own_signals(self.network, state)
+        state.weights[members] = value
 
     def apply(self, state: State, change: Change) -> None:
         """What the events of a step change; all or nothing. Raises PatchError, which it cannot where nothing was set

@@ -373,6 +373,33 @@ class Simulation:
         self._ended = None
         self._reader.use(state)
 
+    def weight_of(self, connections: str) -> float | None:
+        """w[k] of the first of the connections (``K -> O``) that a reference names; None where it names none."""
+        try:
+            _, members = self._parts(connections)
+        except KeyError:
+            return None
+        return float(self._state.weights[members[0]]) if len(members) else None
+
+    def set_weight(self, connections: str, value: float) -> None:
+        """Give connections (``K3 -> O``) this weight from step k on, as an event does (``set: {K3 -> O: 0.4}``): one
+        that learns is changed by its rule from there on, one that follows a parameter follows it again as soon as that
+        is set. Raises KeyError for a name that there is not, ParameterError for a weight that is not finite or beyond
+        its bounds, RecordingError where it is recorded and the recording holds no change of such a weight."""
+        number, (neurons, members) = arguments.finite(value), self._parts(connections)
+        if len(neurons):
+            raise UnknownNameError(f"'{connections}' is no connection: write FROM -> TO")
+        if number is None:
+            raise ParameterError(f"a weight is a finite number, not {reprlib.repr(value)}")
+        is_recorded = self._recorder is not None and self._recorder.going
+        if is_recorded and not np.isin(members, self.network.changing).all():
+            raise RecordingError(f"it is recorded, and a recording has one weight of '{connections}' for all steps")
+        try:
+            self._controls.weigh(self._state, members, number)
+        except PatchError as error:
+            raise ParameterError(str(error)) from None
+        self._ended = None
+
     def _checked(self, values: Mapping[str, object]) -> dict[int, float]:
         """The values by slots, the indices of the parameters. Raises ParameterError."""
         slots, result = self.network.settable.index, {}

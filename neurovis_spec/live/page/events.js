@@ -1,8 +1,7 @@
 /**
- * Events: what was turned, as the `events:` of a spec, and what takes a turn back.
+ * Events: what was turned, as the `events:` of a spec.
  */
 
-/** @typedef {import('./protocol.js').Declared} Declared */
 /** @typedef {import('./protocol.js').Turned} Turned */
 
 /** A name or a text in a flow of YAML. @param {string} text @returns {string} */
@@ -24,7 +23,9 @@ export function eventsOf(turned) {
         last.set(`${at} set ${name}`, { at, entry: { ...entry, values: { [name]: value } } });
       }
     } else {
-      last.set(`${at} ${what} ${of}`, { at, entry });
+      const key = `${at} ${what} ${of}`;
+      last.delete(key); // what is done last at a step is written last
+      last.set(key, { at, entry });
     }
   }
   const all = [...last.values()];
@@ -33,6 +34,8 @@ export function eventsOf(turned) {
     if (type === 'set') {
       const [[name, value]] = Object.entries(entry.values);
       events.push({ at, words: `{at: ${at}, set: {${plain(name)}: ${value}}}` });
+    } else if (type === 'weigh') {
+      events.push({ at, words: `{at: ${at}, set: {${plain(entry.connections)}: ${entry.value}}}` });
     } else if (type === 'hold') {
       const end = all.slice(place + 1).find((other) => other.entry.neurons === neurons);
       events.push({
@@ -46,36 +49,4 @@ export function eventsOf(turned) {
     }
   });
   return events.length ? `events:\n${events.map(({ words }) => `  - ${words}\n`).join('')}` : '';
-}
-
-/** The message that takes a turn back from the step that is shown on. @param {Turned[]} turned @param {number} place
- * @param {Declared[]} declared @returns {{type: string, [member: string]: unknown}} */
-export function takenBack(turned, place, declared) {
-  const { type, part, neurons, connections, on, name, values } = turned[place],
-    before = turned.slice(0, place).reverse();
-  switch (type) {
-    case 'set': {
-      /** @param {string} one @returns {number} */
-      const earlier = (one) => {
-        const set = before.find((entry) => entry.type === 'set' && one in entry.values);
-        return set ? set.values[one] : (declared.find((entry) => entry.name === one) || { value: 0 }).value;
-      };
-      return { type, values: Object.fromEntries(Object.keys(values).map((one) => [one, earlier(one)])) };
-    }
-    case 'hold':
-    case 'release': {
-      const held = before.find((entry) => entry.neurons === neurons);
-      return held && held.type === 'hold' ? { type: 'hold', neurons, value: held.value } : { type: 'release', neurons };
-    }
-    case 'lesion':
-      return { type: 'mend', part };
-    case 'mend':
-      return { type: 'lesion', part };
-    case 'learn':
-      return { type, connections, on: !on };
-    default: {
-      const fed = before.find((entry) => entry.type === 'feed' && entry.name === name);
-      return { type, name, values: fed ? fed.values : [] };
-    }
-  }
 }

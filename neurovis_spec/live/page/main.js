@@ -77,6 +77,7 @@ function show() {
   }
   attention.show(camera, look);
   outline.show(look);
+  turning.weight.show(attention.values);
   controls.frame(look);
   scrubber.show(look);
   axis.show();

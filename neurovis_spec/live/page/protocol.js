@@ -14,7 +14,7 @@ import { isStill } from './camera.js';
 /** @typedef {{name: string, value: number, low: number | null, high: number | null, description: string, unit?: string}} Declared */
 /** A turn: of which members it has, `type` decides.
  * @typedef {{step: number, type: string, name: string, neurons: string, part: string, connections: string, on: boolean,
- *   value: number, values: Object<string, number>, moving?: boolean}} Turned */
+ *   value: number, values: Object<string, number>, moving?: boolean, number: number, since?: number, back: {type: string} | null}} Turned */
 /** @typedef {{families: string[], halo: number, subscriptDrop: number, subscriptSize: number, headOfLength: number,
  *   headOfWidth: number, headMore: number, notch: number, bar: number, lap: number, faint: number, levels: number,
  *   fineness: number, shares: number, share: number, isBar: number, isFaint: number, isNegative: number,
@@ -22,6 +22,7 @@ import { isStill } from './camera.js';
 /** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
  *   theme: Theme, dt: number | null,
  *   time: {step: number, unit: string} | null, discs: number, lines: number, parameters: Declared[],
+ *   ranges: [number | null, number | null, number][], ranged: number[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
  *   themed: boolean, named: string[][], names: number[], curves: Curve[], order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
  *   told: string[], groups: Group[]}} Scene */

@@ -3,8 +3,8 @@
  */
 
 /** @typedef {import('./protocol.js').Declared} Declared */
-/** Of a number: what is declared; with `log`, its slider goes by factors.
- * @typedef {Declared & {log?: boolean}} Row */
+/** Of a number: what is declared; with `log`, its slider goes by factors; with `reach`, as far from 0 where there is no bound.
+ * @typedef {Declared & {log?: boolean, reach?: number}} Row */
 /** What is called when a number is given: with null it is as at the beginning; while it is dragged it is moving.
  * @typedef {(value: number | null, moving: boolean) => void} Given */
 
@@ -12,8 +12,9 @@
 const BETWEEN = 50;
 
 /** Where a slider goes: the bounds, and where there is none as far from the value as 0 is, or by 1.
- * @param {Declared} entry @returns {number[]} */
-function range({ value, low, high }) {
+ * @param {Row} entry @returns {number[]} */
+function range({ value, low, high, reach: far }) {
+  if (far !== undefined) return [low ?? -far, high ?? far];
   const reach = Math.abs(value) || 1,
     least = low === null ? Math.min(value - reach, (high ?? Infinity) - reach) : low;
   return [least, high === null ? Math.max(value + reach, least + reach) : high];

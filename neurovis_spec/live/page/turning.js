@@ -3,15 +3,15 @@
  */
 
 import { Appearance, drawnOtherwise } from './appearance.js';
-import { eventsOf, takenBack } from './events.js';
+import { eventsOf } from './events.js';
 import { Feeds } from './feeds.js';
 import { Rules } from './rules.js';
 import { Sliders, withNumber } from './sliders.js';
+import { Weight } from './weight.js';
 
 /** @typedef {import('./protocol.js').Future} Future */
 /** @typedef {import('./protocol.js').Gains} Gains */
 /** @typedef {import('./protocol.js').Status} Status */
-/** @typedef {import('./protocol.js').Declared} Declared */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Scene} Scene */
@@ -31,6 +31,8 @@ function told(turn) {
       return `clamp ${turn.neurons} = ${turn.value}`;
     case 'feed':
       return fed.length ? `feed ${turn.name} = ${fed.join(', ')}` : `feed ${turn.name} no more`;
+    case 'weigh':
+      return `weight of ${turn.connections} = ${turn.value}`;
     case 'learn':
       return `learning of ${turn.connections} ${turn.on ? 'on' : 'off'}`;
     default:
@@ -48,6 +50,7 @@ export class Turning {
     this.sliders = new Sliders(find('sliders'));
     this.feeds = new Feeds(link, find('feeds'));
     this.rules = new Rules(link, find('rules'));
+    this.weight = new Weight(link, find('weight'));
     this.appearance = new Appearance(
       link,
       /** @type {HTMLSelectElement} */ (find('theme')),
@@ -56,8 +59,6 @@ export class Turning {
     );
     this.shown = '';
     this.others = '';
-    /** @type {Declared[]} */
-    this.declared = [];
     this.ref = '';
     const clampTo = /** @type {HTMLInputElement} */ (find('clampto'));
     find('clamp').onclick = () => withNumber(clampTo, (value) => link.ask('hold', { neurons: this.ref, value }));
@@ -81,7 +82,6 @@ export class Turning {
     const shown = JSON.stringify([parameters, inputs, rules]);
     if (shown === this.shown) return;
     this.shown = shown;
-    this.declared = parameters;
     this.sliders.clear();
     for (const entry of parameters) {
       this.sliders.add(entry, `slider-${entry.name}`, (value, moving) => {
@@ -96,12 +96,13 @@ export class Turning {
 
   /** A neuron or a connection is held, or nothing. @param {Group | undefined} group */
   hold(group) {
-    this.find('part').hidden = !group || !['hold', 'lesion'].some((type) => this.link.takes.has(type));
+    this.find('part').hidden = !group || !['hold', 'lesion', 'weigh'].some((type) => this.link.takes.has(type));
     if (!group) return;
     const { neuron, connection, index } = group.data;
     this.ref = neuron ?? (Number(index) > 1 ? `${connection} (${index})` : connection);
     this.find('parted').textContent = this.ref;
     this.find('clamps').hidden = neuron === undefined;
+    this.weight.hold(group, this.ref);
   }
 
   /** @param {Status} status */
@@ -161,9 +162,7 @@ export class Turning {
     };
     const rows = [
       ...drawnOtherwise(appearance).map(({ words, back }) => row(words, () => ({ type: 'draw', ...back }))),
-      ...turned.map((entry, place) =>
-        row(`step ${entry.step + 1}: ${told(entry)}`, () => takenBack(turned, place, this.declared)),
-      ),
+      ...turned.map((entry) => row(`step ${entry.step + 1}: ${told(entry)}`, () => entry.back ?? { type: '' })),
     ];
     list.replaceChildren(...rows.reverse());
     if (focused) (list.querySelector('button') || this.find('copy')).focus();
