@@ -83,16 +83,16 @@ def content(
             "notch": Arrowhead.NOTCH, "bar": Arrowhead.BAR, "lap": Arrowhead.LAP, "faint": FAINT,
             **more,
         },
-        "groups": [
-            {**_named(group), "shapes": [_shape(shape) for shape in group.shapes]} for group in scene.groups
-        ],
+        "groups": [group_as_json(group) for group in scene.groups],
     }  # fmt: skip
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return gzip.compress(text.encode("utf-8", "replace"), 6, mtime=0)
 
 
-def _named(group: Group) -> dict[str, object]:
-    return {"id": group.id, "data": dict(group.data), "title": group.title}
+def group_as_json(group: Group) -> dict[str, object]:
+    """A group as a page gets it."""
+    shapes = [_shape(shape) for shape in group.shapes]
+    return {"id": group.id, "data": dict(group.data), "title": group.title, "shapes": shapes}
 
 
 def _shape(shape: Shape) -> dict[str, object]:

@@ -22,16 +22,19 @@ import numpy.typing as npt
 
 from neurovis_spec.live.commands import Request
 from neurovis_spec.live.desk import Desk
+from neurovis_spec.live.held import told_of
 from neurovis_spec.live.history import Bins, History
 from neurovis_spec.live.protocol import (
     LEFT,
     TRACE,
+    Connections,
     LookAt,
     Trace,
     acknowledged,
     body_message,
     command_of,
     frame_message,
+    held_message,
     raster_message,
     refused_message,
     scene_message,
@@ -71,6 +74,8 @@ class Client:
     #: the traces that it wants, and those that it is to be sent
     wanted: Trace | None = None
     traces: tuple[bytes, ...] = ()
+    #: what it holds, of which it is to be told all connections
+    held: str = ""
     texts: deque[str | bytes] = field(default_factory=lambda: deque(maxlen=_TEXTS))
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -101,6 +106,9 @@ class Hub:
         self._waiting: deque[Client] = deque()
         self._rest = 0.0
         self._reader: asyncio.TimerHandle | None = None
+        #: who waits for connections, and whether somebody's are being looked up
+        self._holding: deque[Client] = deque()
+        self._looking = False
         self._statuses: dict[bool, str] = {}
         #: what those who come later are told, too, by its type
         self._kept: dict[str, str] = {}
@@ -195,6 +203,36 @@ class Hub:
         names, members = shown.view.raster(item)
         place, _ = shown.view.place(item)
         return raster_message(self._version, place, names, [shown.history.read(one, bins) for one in members], bins)
+
+    def hold(self, client: Client, item: str) -> None:
+        """A client wants all connections of what it holds, in place of what it has asked for before."""
+        if not client.held:
+            self._holding.append(client)
+        client.held = item
+        if not self._looking:
+            self._look_up()
+
+    def _look_up(self) -> None:
+        """Look up connections for whoever has waited longest, beside the loop, as of many it takes a while."""
+        client, shown = self._holding.popleft(), self._shown
+        item, client.held = client.held, ""
+        self._looking = client in self._clients and shown is not None
+        if shown is not None and self._looking:
+            version, view, snapshot = self._version, shown.view, shown.seen.snapshot
+
+            def look() -> bytes:
+                return held_message(told_of(view, item, view.drawn.snapshot(snapshot).weights), version)
+
+            def answer(found: asyncio.Future[bytes]) -> None:
+                self._looking = False
+                if not found.cancelled() and found.exception() is None:
+                    client.tell(found.result())
+                if self._holding:
+                    self._look_up()
+
+            self._loop.run_in_executor(None, look).add_done_callback(answer)
+        elif self._holding:
+            self._look_up()
 
     def drawn(self, client: Client, serial: int) -> None:
         """A client has drawn a frame, and so those before it."""
@@ -300,6 +338,8 @@ class Reception:
             self._hub.check(client, command.items)
         elif isinstance(command, Trace):
             self._hub.trace(client, command)
+        elif isinstance(command, Connections):
+            self._hub.hold(client, command.of)
         elif not client.owner:
             client.tell(refused_message("this page only looks on"))
         elif not isinstance(command, Request):

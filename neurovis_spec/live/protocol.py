@@ -46,6 +46,7 @@ from neurovis_spec.live.commands import (
 )
 from neurovis_spec.live.drawing import Moved
 from neurovis_spec.live.futures import Future
+from neurovis_spec.live.held import KINDS
 from neurovis_spec.live.history import Bins, Range
 from neurovis_spec.live.run import Status
 from neurovis_spec.live.saving import MOST_SECONDS
@@ -55,7 +56,7 @@ from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
-SCENE, FRAME, TRACE, FILE, RASTER, LEFT = 1, 2, 3, 4, 5, 6
+SCENE, FRAME, TRACE, FILE, RASTER, LEFT, HELD = 1, 2, 3, 4, 5, 6, 7
 #: kind, scene
 _SCENE_HEAD = struct.Struct("<BxH")
 #: kind, scene, serial, changed, step, first, last, bytes of the caption, numbers of the pose
@@ -99,6 +100,11 @@ class ProtocolError(ValueError):
 def scene_message(content: bytes, version: int) -> bytes:
     """The scene with its version, which frames name."""
     return _SCENE_HEAD.pack(SCENE, version) + content
+
+
+def held_message(content: bytes, version: int) -> bytes:
+    """The connections of what a client holds, in a scene of this version."""
+    return _SCENE_HEAD.pack(HELD, version) + content
 
 
 def frame_message(glance: Glance, reach: Reach, version: int, serial: int, changed: npt.NDArray[np.int64]) -> bytes:
@@ -266,6 +272,17 @@ class Trace:
     rasters: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Connections:
+    """The client wants once all connections ``of`` what it holds; viewers may ask for it, too."""
+
+    of: str
+
+
+#: What is nobody else's business, so that viewers may ask for it.
+Wish: TypeAlias = LookAt | Trace | Connections
+
+
 def acknowledged(data: bytes) -> Acknowledged:
     """A binary message: four bytes. Raises ProtocolError."""
     if len(data) != 4:
@@ -273,7 +290,7 @@ def acknowledged(data: bytes) -> Acknowledged:
     return Acknowledged(int.from_bytes(data, "little"))
 
 
-def command_of(text: str) -> Command | Request | LookAt | Trace:
+def command_of(text: str) -> Command | Request | Wish:
     """A text message. Raises ProtocolError."""
     if len(text) > LARGEST:
         raise ProtocolError("the message is too long")
@@ -400,7 +417,13 @@ def _trace(items: tuple[str, ...], first: int, every: int, bins: int, rasters: t
     return Trace(items, Bins(first, every, bins), rasters)
 
 
-_MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command | Request | LookAt | Trace]]]] = {
+def _held(value: object) -> str:
+    if not isinstance(value, str) or not KINDS.fullmatch(value):
+        raise ProtocolError("the id of what can be held is wanted")
+    return value
+
+
+_MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command | Request | Wish]]]] = {
     "look": ({"items": _items}, LookAt),
     "trace": (
         {
@@ -412,6 +435,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
         },
         _trace,
     ),
+    "connections": ({"of": _held}, Connections),
     "play": ({}, Play),
     "pause": ({}, Pause),
     "step": ({"by": _whole(-_NEAR, _NEAR)}, Step),

@@ -19,7 +19,7 @@ from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SPIKE, SYNAPSE
-from neurovis_spec.layout.model import Layout
+from neurovis_spec.layout.model import RADIUS, Layout
 from neurovis_spec.live.commands import AS_IT_IS, Appearance
 from neurovis_spec.live.curves import Curves, curves_of
 from neurovis_spec.live.declared import declared
@@ -202,6 +202,11 @@ class View:
         gone = np.bincount(drawn.bundle[outside], seen.lesioned_connections[outside], len(drawn.counts))
         return self._all(seen.lesioned_neurons), gone == drawn.counts
 
+    @property
+    def radius(self) -> float:
+        """That of the discs of neurons, in page units."""
+        return RADIUS * self.plan.frame.scale / self.plan.unit
+
     def _all(self, neurons: Mask) -> Mask:
         """Which glyphs stand for such neurons and no others."""
         drawn = self.drawn
@@ -245,7 +250,10 @@ def view_of(
     listed = quantities.listed(Glyphs(drawn.unit, len(drawn.sizes)), Glyphs(drawn.bundle, len(drawn.counts)))
     names = {"named": [list(one) for one in listed.lists], "names": listed.of.tolist() if len(quantities) else []}
     curves = curves_of(drawn)
-    begins = {"curves": [asdict(curve) for curve in curves.shown]}
+    begins = {
+        "boxes": {name: list(one) for name, one in planned.boxes.items()},
+        "curves": [asdict(curve) for curve in curves.shown],
+    }
     more = {**declared(compiled), **ranges_of(drawn), **names, **begins, "themes": list(THEMES), "themed": themed}
     words = content(drawn.network, scene, rows, constants, more)
     otherwise = otherwise or partial(view_of, compiled, gains, theme, engine, layout=layout)
@@ -267,13 +275,13 @@ def _scene(drawn: Gathered, planned: Plan, gains: Gains) -> Scene:
     activity, weights = np.zeros(len(network.neurons)), network.connections.weights.whole()
     shown = looks(network, Snapshot(0, activity, weights, None), gains, planned.frame.widest)
     of_neurons, of_connections = tooltips(network, gains, activity[None], weights[None])
-    words = [_without_value(text) for text in of_neurons], [_without_value(text) for text in of_connections]
+    words = [without_value(text) for text in of_neurons], [without_value(text) for text in of_connections]
     scene = paint(planned, shown, np.zeros(len(shown.lines), bool), caption(network, 0, activity), words, 0)
     groups = tuple(replace(group, opacity=1.0) for group in scene.groups)
     return replace(scene, title=planned.title, groups=groups, told=told(drawn, weights, weights, shown.ends[None]))
 
 
-def _without_value(tooltip: str) -> str:
+def without_value(tooltip: str) -> str:
     """A tooltip without its second line."""
     name, _, more = tooltip.partition("\n")
     return "\n".join([name, *more.split("\n")[1:]])

@@ -250,7 +250,12 @@ def drawn(network: Network, bundle: Bundle, theme: Theme, step: int, gone: froze
     lost = len(gone.intersection(one.members.tolist()))
     data |= {"lesioned": str(lost)} if lost else {}
     opacity = FAINT if lost == len(one.members) else 1.0
-    return Group(tuple(shapes), f"bundle:{name}", data, _said(name, one, step, lost), opacity)
+    return Group(tuple(shapes), id_of(one, network), data, _said(name, one, step, lost), opacity)
+
+
+def id_of(one: Pathway, network: Network) -> str:
+    """The id of the group of a bundle."""
+    return f"bundle:{one.name(network)}"
 
 
 def _said(name: str, one: Pathway, step: int, lost: int) -> str:

@@ -6,7 +6,7 @@ has a second ring, and the number of these under its name.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene import encoding, texts
 from neurovis_spec.scene.ends import EndArray, ends_of
@@ -177,20 +177,23 @@ def _connections(planned: Plan, seen: Looks, glowing: npt.NDArray[np.bool_], tit
     return groups
 
 
-def data_attributes(network: Network) -> list[dict[str, str]]:
-    """``connection``, ``from``, ``to`` and ``delay`` of every connection; ``index`` where several share both ends, and
-    ``style``, what its line is solid or dashed for."""
+def data_attributes(network: Network, some: Sequence[int] | None = None) -> list[dict[str, str]]:
+    """``connection``, ``from``, ``to`` and ``delay`` of every connection, or of some; ``index`` where several share
+    both ends, and ``style``, what its line is solid or dashed for."""
     names, connections = network.neurons.names, network.connections
-    ends = list(zip(connections.sources.tolist(), connections.targets.tolist(), strict=True))
-    sharing, styles = Counter(ends), connections.styles
-    result: list[dict[str, str]] = []
-    for full, (source, target), delay in zip(network.connection_names, ends, connections.delays.tolist(), strict=True):
+    chosen = np.arange(len(connections)) if some is None else np.array(some, np.int64)
+    pairs = connections.sources.whole() * len(names) + connections.targets.whole()
+    _, which, sharing = np.unique(pairs, return_inverse=True, return_counts=True)
+    ends = connections.sources[chosen].tolist(), connections.targets[chosen].tolist()
+    columns = zip(*ends, connections.delays[chosen].tolist(), sharing[which[chosen]].tolist(), strict=True)
+    result, styles = list[dict[str, str]](), connections.styles
+    for index, (source, target, delay, alike) in zip(chosen.tolist(), columns, strict=True):
         plain = f"{names[source]} -> {names[target]}"
         data = {"connection": plain, "from": names[source], "to": names[target]}
-        if sharing[source, target] > 1:
-            data["index"] = full[len(plain) + 2 : -1] or "1"
+        if alike > 1:
+            data["index"] = network.connection_names[index][len(plain) + 2 : -1] or "1"
         data["delay"] = str(delay)
-        if styles is not None and (style := styles.of(len(result))):
+        if styles is not None and (style := styles.of(index)):
             data["style"] = style
         result.append(data)
     return result
@@ -199,7 +202,7 @@ def data_attributes(network: Network) -> list[dict[str, str]]:
 def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: FloatArray) -> tuple[list[str], list[str]]:
     """What a pointer shows of neurons and connections: name, activity, the state that it shows, or weight (from … to
     where there are several steps), rule, gains. ``activity`` (steps, n), ``weights`` (steps, m)."""
-    neurons, connections = network.neurons, network.connections
+    neurons = network.neurons
     of_neurons = [""] * len(neurons)
     lows, highs = activity.min(axis=0).tolist(), activity.max(axis=0).tolist()
     traces, states = told_times(network, seconds_of(network)).tolist(), ShownStates(network).called
@@ -213,27 +216,35 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
             told = f"{states[index] or 'activity'} {_range(lows[index], highs[index])}"
             parts = [first, told, kind, group.description or "", seen, fades]
             of_neurons[index] = "\n".join(part for part in parts if part)
-    of_connections = []
-    scaled = _gains_of(network, gains)
-    lows, highs = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
-    twins, synapses = None if connections.twins is None else connections.twins.tolist(), connections.synapses
-    rows = zip(connections.delays.tolist(), connections.entry.tolist(), strict=True)
+    return of_neurons, connection_tooltips(network, gains, weights)
+
+
+def connection_tooltips(
+    network: Network, gains: Gains, weights: FloatArray, some: Sequence[int] | None = None
+) -> list[str]:
+    """What a pointer shows of every connection, or of some; ``weights`` (steps, m)."""
+    connections = network.connections
+    chosen = np.arange(len(connections)) if some is None else np.array(some, np.int64)
+    of_connections, scaled = list[str](), _gains_of(network, gains, chosen)
+    lows, highs = weights[:, chosen].min(axis=0).tolist(), weights[:, chosen].max(axis=0).tolist()
+    twins, synapses = None if connections.twins is None else connections.twins[chosen].tolist(), connections.synapses
+    rows = zip(chosen.tolist(), connections.delays[chosen].tolist(), connections.entry[chosen].tolist(), strict=True)
     own, styles = connections.own_labels, connections.styles
-    for index, (delay, entry) in enumerate(rows):
+    for place, (index, delay, entry) in enumerate(rows):
         style = "" if styles is None else styles.of(index)
         parts = [
-            network.connection_names[index].replace("->", "→" if twins is None or twins[index] < 0 else "↔")
+            network.connection_names[index].replace("->", "→" if twins is None or twins[place] < 0 else "↔")
             + (f": {called}" if (called := (own and own.of(index)) or connections.labels[entry]) else ""),
-            f"weight {_range(lows[index], highs[index])}",
+            f"weight {_range(lows[place], highs[place])}",
             f"synapse {synapses[entry]}" if synapses and synapses[entry] else "",
             connections.learns[entry] or "",
             f"delay {delay}" if delay != 1 else "",
             f"{network.render.style} {style}" if style else "",
             connections.descriptions[entry] or "",
-            scaled[index],
+            scaled[place],
         ]
         of_connections.append("\n".join(part for part in parts if part))
-    return of_neurons, of_connections
+    return of_connections
 
 
 def _gain_of(gain: float, centre: float) -> str:
@@ -243,14 +254,14 @@ def _gain_of(gain: float, centre: float) -> str:
     return f"gain {texts.number(gain)}"
 
 
-def _gains_of(network: Network, gains: Gains) -> list[str]:
-    """The gains of each connection, in words; that of changes where its weight can change. Most are said of many."""
-    learns = np.isin(np.arange(len(network.connections)), network.changing).tolist()
-    signals, widths = gains.signal.tolist(), gains.thickness.tolist()
-    roots = gains.signal_compressed.tolist(), gains.thickness_compressed.tolist()
+def _gains_of(network: Network, gains: Gains, some: IntArray) -> list[str]:
+    """The gains of some connections, in words; that of changes where its weight can change. Most are said of many."""
+    learns = np.isin(some, network.changing).tolist()
+    signals, widths = gains.signal[some].tolist(), gains.thickness[some].tolist()
+    roots = gains.signal_compressed[some].tolist(), gains.thickness_compressed[some].tolist()
     said: dict[tuple[float, float, float, bool, bool, bool], str] = {}
     result = []
-    for key in zip(signals, widths, gains.change.tolist(), learns, *roots, strict=True):
+    for key in zip(signals, widths, gains.change[some].tolist(), learns, *roots, strict=True):
         if key not in said:
             of = [" of the square root" if compressed else "" for compressed in key[4:]]
             told = [f"signal {texts.number(key[0])}{of[0]}", f"thickness {texts.number(key[1])}{of[1]}"]

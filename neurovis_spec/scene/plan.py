@@ -118,6 +118,9 @@ class Plan:
     unit: float
     #: what is left out, as the picture says it
     notes: tuple[str, ...]
+    #: who is in each box, and what is left out of which pathway and stands as a bundle, by the ids of their groups
+    boxes: Mapping[str, tuple[int, ...]]
+    left: Mapping[str, Pathway]
 
     def theme_ends(self, ends: EndArray) -> EndArray:
         """How lines end in its theme, which may know nothing but arrows."""
@@ -178,6 +181,8 @@ def plan(
         captioned=None if framed.title is None else lowered(framed.title, frame.width),
         unit=1.0,
         notes=content.notes,
+        boxes={f"{box.kind}:{box.path}": box.members for box in page.boxes},
+        left={bundles.id_of(one.pathway, network): one.pathway for one in page.bundles.all},
     )
     return made if framed.unit == 1 else _in_user_units(made, framed.unit)
 

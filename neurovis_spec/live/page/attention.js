@@ -2,6 +2,7 @@
  * Attention: what is pointed at, and what is held; its values, and what stands out with it.
  */
 
+import { halfway } from './marks.js';
 import { say } from './say.js';
 
 /** @typedef {import('./camera.js').Camera} Camera */
@@ -10,6 +11,7 @@ import { say } from './say.js';
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./protocol.js').Group} Group */
+/** @typedef {import('./protocol.js').Told} Told */
 
 /** A number with its sign, for what is not told by colour alone. @param {number | null} value @returns {string} */
 export function signed(value) {
@@ -27,6 +29,8 @@ const SIDES = [
   ],
   GAP = 14,
   COARSE = 32;
+/** The id of a neuron or a connection. */
+const ITEM = /^[nc]\d+$/;
 
 /** Points along a cubic spline. @param {number[]} points @returns {number[][]} */
 function along(points) {
@@ -43,10 +47,8 @@ function along(points) {
 /** What is pointed at and what is held, by the ids of their groups, '' for nothing. */
 export class Attention {
   /** @param {Link} link @param {Zoom} zoom @param {() => void} changed called when something else is to be seen
-   * @param {(group: Group | undefined) => void} taken called with what is held @param {(id: string) => void} entered called with
-   * a closed box */
-  constructor(link, zoom, changed, taken, entered) {
-    this.entered = entered;
+   * @param {(group: Group | undefined) => void} taken called with what is held */
+  constructor(link, zoom, changed, taken) {
     this.taken = taken;
     this.zoom = zoom;
     /** what else the values are wanted of @type {string[]} */
@@ -61,8 +63,14 @@ export class Attention {
     this.also = [];
     /** where a picture of another kind has something, in units @type {((id: string) => number[]) | null} */
     this.spot = null;
-    /** @type {Map<string, Group>} */
+    /** neurons and connections, those that the picture leaves out as soon as they were held @type {Map<string, Group>} */
     this.groups = new Map();
+    /** bundles and boxes @type {Map<string, Group>} */
+    this.others = new Map();
+    /** what is told of all connections of what is held, and what is to be held as soon as it is told of
+     * @type {Told | null} */
+    this.all = null;
+    this.coming = '';
     /** the dotted lines from neurons to rules @type {Group[]} */
     this.signals = [];
     /** the ids of what stands out with what is held @type {Set<string>} */
@@ -79,13 +87,17 @@ export class Attention {
 
   /** Another network; what has the same name in it stays held. @param {Scene} scene */
   use(scene) {
-    const before = this.groups.get(this.held),
-      name = before && JSON.stringify(before.data);
-    this.groups = new Map(scene.groups.filter(({ id }) => /^[nc]\d+$/.test(id)).map((group) => [group.id, group]));
+    const { held } = this,
+      before = this.groups.get(held),
+      name = before && JSON.stringify(before.data),
+      of = (/** @type {RegExp} */ kind) =>
+        new Map(scene.groups.filter(({ id }) => kind.test(id)).map((group) => [group.id, group]));
+    this.groups = of(ITEM);
+    this.others = of(/^(box|instance|bundle):/);
     this.signals = scene.groups.filter(({ data }) => data.signal !== undefined);
     this.pointed = '';
     const same = [...this.groups.values()].find(({ data }) => JSON.stringify(data) === name);
-    this.hold(same ? same.id : '');
+    this.hold(same ? same.id : this.others.has(held) ? held : '');
   }
 
   /** Ask for the values of what is shown. */
@@ -96,7 +108,13 @@ export class Attention {
   /** The ids of neurons, connections and errors whose values are shown, of what they have with its name. @returns {string[]} */
   wanted() {
     const all = new Set([this.pointed, this.held, ...this.also, ...this.listed]);
-    return [...all].filter((id) => id[0] === 'e' || this.groups.has(id.split('.')[0])).slice(0, 64);
+    return [...all].filter((id) => id[0] === 'e' || this.isKnown(id.split('.')[0])).slice(0, 64);
+  }
+
+  /** Whether there is such a neuron or connection, drawn or not. @param {string} id @returns {boolean} */
+  isKnown(id) {
+    const { scene } = this.link;
+    return this.groups.has(id) || (/^c\d+$/.test(id) && scene !== null && Number(id.slice(1)) < scene.lines);
   }
 
   /** @param {string} id @param {number[]} place */
@@ -109,18 +127,38 @@ export class Attention {
     this.changed();
   }
 
-  /** Hold a neuron or a connection, or enter a closed box; '' lets go. @param {string} id */
+  /** Hold a neuron, a connection, a bundle or a box; '' lets go. All its connections are asked for, and what the picture
+   * leaves out is held as soon as it is told of. @param {string} id */
   hold(id) {
-    if (id && !this.groups.has(id)) {
-      this.entered(id);
-      return;
-    }
+    if (id) this.link.ask('connections', { of: id });
+    this.coming = id;
+    if (!id || this.groups.has(id) || this.others.has(id)) this.keep(id);
+  }
+
+  /** Something is held. @param {string} id */
+  keep(id) {
     this.held = id;
+    if (this.all && this.all.of !== id) this.all = null;
     this.near = new Set(id ? this.around(id) : []);
     this.saying = id !== '';
     this.ask();
     this.taken(this.groups.get(id));
     this.changed();
+  }
+
+  /** All connections of what is held are told. @param {Told} told @returns {boolean} whether it still is */
+  tell(told) {
+    if (told.of !== this.coming) return false;
+    for (const group of told.groups) this.groups.set(group.id, group);
+    this.all = told;
+    if (told.of === this.held) {
+      this.near = new Set(this.around(this.held));
+      this.speak();
+      this.changed();
+    } else if (this.groups.has(told.of) || this.others.has(told.of)) {
+      this.keep(told.of);
+    }
+    return true;
   }
 
   /** The next neuron, or the one before. @param {number} by */
@@ -131,30 +169,43 @@ export class Attention {
       this.hold(neurons[(at < 0 ? (by > 0 ? 0 : neurons.length - 1) : at + by + neurons.length) % neurons.length]);
   }
 
-  /** What a neuron's inputs and outputs are, or a connection's ends. @param {string} id @returns {string[]} */
+  /** The names of the neurons of what can be held: one, those in a box, or none. @param {string} id @returns {Set<string>} */
+  within(id) {
+    const inside = this.link.scene?.boxes[id]?.map((index) => `n${index}`) ?? [id];
+    return new Set(inside.flatMap((one) => this.groups.get(one)?.data.neuron ?? []));
+  }
+
+  /** What the inputs and outputs of neurons are, or the ends of connections. @param {string} id @returns {string[]} */
   around(id) {
-    const { data } = /** @type {Group} */ (this.groups.get(id)),
-      all = [...this.groups.values()];
-    const lines =
-      data.neuron === undefined
-        ? [this.groups.get(id)]
-        : all.filter((line) => line.data.from === data.neuron || line.data.to === data.neuron);
-    const dotted = this.signals.filter((signal) => signal.data.signal.split(' -> ').includes(data.neuron));
+    const own = this.within(id),
+      all = [...this.groups.values()],
+      told = this.others.has(id) && this.all ? this.all.groups : [];
+    const lines = own.size
+      ? all.filter((line) => own.has(line.data.from) || own.has(line.data.to))
+      : [this.groups.get(id), ...told];
+    const dotted = this.signals.filter((signal) => signal.data.signal.split(' -> ').some((end) => own.has(end)));
     const ends = new Set(lines.flatMap((line) => (line ? [line.data.from, line.data.to] : [])));
     for (const signal of dotted) for (const end of signal.data.signal.split(' -> ')) ends.add(end);
-    const discs = all.filter((disc) => disc.data.neuron !== undefined && ends.has(disc.data.neuron));
+    const discs = all.filter(
+      ({ data }) => data.neuron !== undefined && (ends.has(data.neuron) || own.has(data.neuron)),
+    );
     return [id, ...[...lines, ...dotted, ...discs].map((group) => (group ? group.id : ''))];
   }
 
   /** @param {{values: Object<string, number | null>}} message */
   take(message) {
     this.values = message.values;
+    this.speak();
+    this.changed();
+  }
+
+  /** Have what is held be read, once all is known of it. */
+  speak() {
     const { look } = this.link;
-    if (this.saying && look && this.held in this.values) {
+    if (this.saying && look && this.all && (this.held in this.values || this.others.has(this.held))) {
       this.saying = false;
       this.say(look);
     }
-    this.changed();
   }
 
   /** Have a screen reader read what is held. @param {Look} look */
@@ -162,11 +213,31 @@ export class Attention {
     if (this.held) say(this.words(this.held, look).replaceAll('\n', ', '));
   }
 
-  /** What is said of a neuron, a connection or a closed box: name, activity, the state that it shows, or weight, delay, rule. @param {string} id @param {Look} look
+  /** What is said of all connections of what is held. @param {string} id @returns {string[]} */
+  counts(id) {
+    if (!this.all || this.all.of !== id) return [];
+    const { inputs, outputs, within, undrawn } = this.all,
+      count = (/** @type {number} */ number) => number.toLocaleString('en'),
+      among = id[0] === 'n' ? 'to itself' : 'within',
+      all = inputs + outputs + within;
+    return [
+      ...(this.within(id).size
+        ? [`connections ${count(inputs)} in, ${count(outputs)} out${within ? `, ${count(within)} ${among}` : ''}`]
+        : []),
+      ...(undrawn ? [`${count(undrawn)} of ${count(all)}, the weakest, are not drawn`] : []),
+    ];
+  }
+
+  /** What is said of a neuron, a connection, a bundle or a box: name, activity, the state that it shows, or weight, delay, rule. @param {string} id @param {Look} look
    * @returns {string} */
   words(id, look) {
-    const group = this.groups.get(id);
-    if (!group) return this.zoom.words(id, look);
+    return [this.itself(id, look), ...this.counts(id)].filter(Boolean).join('\n');
+  }
+
+  /** The same without its connections. @param {string} id @param {Look} look @returns {string} */
+  itself(id, look) {
+    const group = this.groups.get(id) ?? this.unseen(id);
+    if (!group) return id.startsWith('bundle:') ? (this.others.get(id)?.title ?? '') : this.zoom.words(id, look);
     const [name, ...more] = group.title.split('\n'),
       { neuron, delay, state } = group.data;
     const what = neuron === undefined ? 'weight' : (state ?? 'activity'),
@@ -184,11 +255,20 @@ export class Attention {
     ].join('\n');
   }
 
-  /** Where a neuron is, or the tip of a connection. @param {string} id @returns {number[]} */
+  /** What is known of a connection that the picture leaves out. @param {string} id @returns {Group | null} */
+  unseen(id) {
+    const { scene } = this.link;
+    if (!scene || !this.isKnown(id)) return null;
+    const [from, to] = scene.ends.map((ends) => this.groups.get(`n${ends[Number(id.slice(1))]}`)?.data.neuron ?? '');
+    return { id, data: { from, to }, title: `${from} → ${to}`, shapes: [] };
+  }
+
+  /** Where a neuron is, the tip of a connection, the middle of a bundle, the corner of a box. @param {string} id
+   * @returns {number[]} */
   middle(id) {
-    if (this.spot) return this.spot(id);
-    const { shapes } = /** @type {Group} */ (this.groups.get(id));
-    return shapes[id[0] === 'n' ? 0 : 1].at;
+    if (this.spot && ITEM.test(id)) return this.spot(id);
+    const [first, second] = (this.groups.get(id) ?? this.others.get(id))?.shapes ?? [];
+    return (/^c/.test(id) ? second?.at : first?.at) ?? (first?.points ? halfway(first.points) : [0, 0]);
   }
 
   /** Points of the lines that are told of: a connection's, or those of a neuron's inputs and outputs, and their discs.
@@ -196,7 +276,7 @@ export class Attention {
   told(id) {
     const group = this.groups.get(id);
     if (!group) return [];
-    const shown = group.data.neuron === undefined ? [id] : this.around(id);
+    const shown = group.data.neuron === undefined ? [id] : id === this.held ? [...this.near] : this.around(id);
     return shown.flatMap((one) => {
       const [{ at, points }] = this.groups.get(one)?.shapes ?? [{}];
       return points ? along(points) : at ? [at] : [];

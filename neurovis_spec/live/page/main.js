@@ -34,6 +34,8 @@ const camera = new Camera(),
   zoom = new Zoom();
 /** What is gone to is seen with so many radii of a neuron around it. */
 const ROOM = 12;
+/** The id of a neuron or a connection. */
+const ITEM = /^[nc]\d+$/;
 /** @type {Drawing | null} */
 let drawing = null;
 /** what is lesioned in it @type {Marks | null} */
@@ -143,6 +145,13 @@ const link = new Link({
   raster(raster) {
     strips.raster(raster);
   },
+  held(told) {
+    if (!attention.tell(told)) return;
+    zoom.more(told.groups);
+    placing.more(told.groups);
+    outline.more(told.groups);
+    outline.hold();
+  },
   file(name, blob) {
     download(blob, name);
   },
@@ -181,17 +190,12 @@ const link = new Link({
 const controls = new Controls(link);
 const turning = new Turning(link, part);
 const refusal = new Refusal(part('refusal'));
-const attention = new Attention(
-  link,
-  zoom,
-  redraw,
-  (group) => {
-    turning.hold(group);
-    outline.hold();
-    strips.hold(group);
-  },
-  (id) => go(id),
-);
+const attention = new Attention(link, zoom, redraw, (group) => {
+  if (!attention.all) zoom.more([]);
+  turning.hold(group);
+  outline.hold();
+  strips.hold(group);
+});
 const outline = new Outline(attention, part, (id) => go(id));
 const scrubber = new Scrubber(link, part, redraw);
 const axis = new Axis(scrubber, part);
@@ -214,25 +218,33 @@ function choose(asMatrix) {
   redraw();
 }
 
-/** Hold a neuron or a connection, or go to a box; where it is not seen, the picture is moved. @param {string} id */
+/** Hold a neuron, a connection or a bundle, or go to a box; where it is not seen, the picture is moved. @param {string} id */
 function go(id) {
-  const box = zoom.boxes.find((one) => one.id === id),
-    { look } = link;
+  if (zoom.boxes.some((one) => one.id === id)) enter(id);
+  attention.hold(id);
+  if (ITEM.test(id) && attention.held === id) see(id);
+  redraw();
+}
+
+/** Go to a box, so that it opens. @param {string} id */
+function enter(id) {
+  const box = zoom.boxes.find((one) => one.id === id);
   if (box) {
     const [x0, y0, x1, y1] = box.rect,
       room = 0.1 * Math.max(x1 - x0, y1 - y0);
     choose(false);
     attention.point('', [0, 0]);
     camera.see([x0 - room, y0 - room, x1 + room, y1 + room], 1.01 * zoom.opening(box));
-    if (look) say(zoom.words(id, look).replaceAll('\n', ', '));
-  } else {
-    attention.hold(id);
-    const [x, y] = attention.middle(id),
-      room = ROOM * (drawing?.discs[0]?.shape.radius ?? 20);
-    const outside = camera.pixel(x, y).some((pixel, axis) => pixel < 0 || pixel > camera.window[axis]);
-    if (outside || (!matrix && zoom.under([x, y]))) camera.see([x - room, y - room, x + room, y + room]);
   }
   redraw();
+}
+
+/** Have a neuron or a connection be seen. @param {string} id */
+function see(id) {
+  const [x, y] = attention.middle(id),
+    room = ROOM * (drawing?.discs[0]?.shape.radius ?? 20);
+  const outside = camera.pixel(x, y).some((pixel, axis) => pixel < 0 || pixel > camera.window[axis]);
+  if (outside || (!matrix && zoom.under([x, y]))) camera.see([x - room, y - room, x + room, y + room]);
 }
 
 new ResizeObserver(resize).observe(canvas);
@@ -250,6 +262,10 @@ const pointer = new Pointer(canvas, camera, attention, placing, {
     const { look } = link;
     if (matrix) return matrix.under(camera, x, y);
     return zoom.under(camera.unit(x, y)) || (drawing && look ? under(drawing, camera, look, x, y) : '');
+  },
+  pressed(id) {
+    if (zoom.boxes.some((box) => box.id === id)) enter(id);
+    else attention.hold(id);
   },
   redraw,
 });

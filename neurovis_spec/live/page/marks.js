@@ -16,7 +16,7 @@ const IN_DISC = 0.6,
   HIGH = 14;
 
 /** The middle of a cubic spline. @param {number[]} points @returns {number[]} */
-function halfway(points) {
+export function halfway(points) {
   const pieces = (points.length - 2) / 6,
     first = 6 * Math.floor(pieces / 2);
   return [0, 1].map((axis) => {

@@ -182,8 +182,7 @@ export class Matrix {
     if (row >= count || column >= count || (row < 0 && column < 0)) return '';
     if (row >= 0 && column >= 0) {
       const cell = this.cells.get(row * count + column);
-      // of what the picture leaves out nothing is told; of several the one after what is held
-      const lines = (cell?.lines ?? []).map((line) => `c${line}`).filter((line) => this.groups.has(line));
+      const lines = (cell?.lines ?? []).map((line) => `c${line}`); // of several the one after what is held
       return lines[(lines.indexOf(this.held) + 1) % lines.length] ?? '';
     }
     return this.rows[Math.max(row, column)].id;

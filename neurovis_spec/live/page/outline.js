@@ -5,11 +5,12 @@
 import { search } from './search.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
+/** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./search.js').Entry} Entry */
 
-/** As many are listed, and the values of so many are asked for: those around the one that is chosen. */
+/** As many are listed, and so many more where the last is chosen or seen; and the values of so many are asked for: those around the one that is chosen. */
 const LISTED = 100,
   VALUED = 24;
 
@@ -25,8 +26,8 @@ export class Outline {
     this.list = find('found');
     /** @type {Entry[]} */
     this.entries = [];
-    /** what is listed @type {Entry[]} */
-    this.shown = [];
+    /** what is listed, of all that fits @type {Entry[]} */
+    this.shown = this.all = [];
     this.at = 0;
     this.field.oninput = () => this.fill();
     this.field.onkeydown = (event) => this.key(event);
@@ -34,24 +35,36 @@ export class Outline {
       const row = /** @type {Element} */ (event.target).closest('li');
       if (row) this.choose([...this.list.children].indexOf(row));
     };
+    this.list.onscroll = () => {
+      const { scrollTop, clientHeight, scrollHeight } = this.list;
+      if (scrollTop + 2 * clientHeight > scrollHeight && this.shown.length < this.all.length) this.further();
+    };
     find('outlined').onclick = () => this.toggle();
     this.taken = taken;
   }
 
   /** Another network. @param {Scene} scene */
   use(scene) {
-    // boxes first, then neurons, then connections
-    const rank = (/** @type {Entry} */ { id }) => 'nc'.indexOf(id[0]);
-    this.entries = scene.groups
-      .filter(({ id }) => /^([nc]\d+$|box:|instance:)/.test(id))
+    this.entries = [];
+    this.more(scene.groups);
+  }
+
+  /** There is more to be listed. @param {Group[]} groups */
+  more(groups) {
+    // boxes and bundles first, then neurons, then connections
+    const rank = (/** @type {Entry} */ { id }) => 'nc'.indexOf(id[0]),
+      known = new Set(this.entries.map(({ id }) => id));
+    const added = groups
+      .filter(({ id }) => /^([nc]\d+$|box:|instance:|bundle:)/.test(id) && !known.has(id))
       .map(({ id, data, title }) => {
         const [first, ...more] = title.split('\n');
         return { id, name: data.neuron === undefined ? first : data.neuron, more: [first, ...more].join('\n') };
-      })
-      .sort(
-        (one, other) =>
-          rank(one) - rank(other) || (rank(one) < 0 ? 0 : Number(one.id.slice(1)) - Number(other.id.slice(1))),
-      );
+      });
+    if (!added.length) return;
+    this.entries = [...this.entries, ...added].sort(
+      (one, other) =>
+        rank(one) - rank(other) || (rank(one) < 0 ? 0 : Number(one.id.slice(1)) - Number(other.id.slice(1))),
+    );
     this.fill();
   }
 
@@ -79,10 +92,10 @@ export class Outline {
   /** What is listed without a search: what is held with its inputs and outputs, else all. @returns {Entry[]} */
   first() {
     const { held, near, groups } = this.attention,
-      one = groups.get(held);
-    if (!one) return this.entries;
-    const to = (/** @type {Entry} */ { id }) => groups.get(id)?.data.to === one.data.neuron;
-    const found = this.entries.filter(({ id }) => id !== held && near.has(id) && (id[0] === 'c') === (held[0] === 'n'));
+      own = this.attention.within(held);
+    if (!held) return this.entries;
+    const to = (/** @type {Entry} */ { id }) => own.has(groups.get(id)?.data.to ?? '');
+    const found = this.entries.filter(({ id }) => id !== held && near.has(id) && (id[0] === 'c') === (held[0] !== 'c'));
     return [
       ...this.entries.filter(({ id }) => id === held),
       ...found.filter(to),
@@ -96,10 +109,19 @@ export class Outline {
       this.value([]);
       return;
     }
-    const found = this.field.value.trim() ? search(this.entries, this.field.value) : this.first();
-    this.shown = found.slice(0, LISTED);
-    this.list.replaceChildren(
-      ...this.shown.map(({ id }) => {
+    this.all = this.field.value.trim() ? search(this.entries, this.field.value) : this.first();
+    this.shown = [];
+    this.list.replaceChildren();
+    this.further();
+    this.to(0);
+  }
+
+  /** List more of what fits. */
+  further() {
+    const more = this.all.slice(this.shown.length, this.shown.length + LISTED);
+    this.shown = [...this.shown, ...more];
+    this.list.append(
+      ...more.map(({ id }) => {
         const row = document.createElement('li'),
           [name, more] = ['b', 'span'].map((tag) => document.createElement(tag));
         row.id = `found-${id}`;
@@ -108,13 +130,13 @@ export class Outline {
         return row;
       }),
     );
-    const left = found.length - this.shown.length;
-    this.find('more').textContent = left ? `and ${left} more` : found.length ? '' : 'nothing is called so';
-    this.to(0);
+    const left = this.all.length - this.shown.length;
+    this.find('more').textContent = left ? `and ${left} more` : this.all.length ? '' : 'nothing is called so';
   }
 
   /** Go to a row. @param {number} at */
   to(at) {
+    if (at >= this.shown.length && this.shown.length < this.all.length) this.further();
     this.at = Math.max(0, Math.min(this.shown.length - 1, at));
     [...this.list.children].forEach((row, place) => {
       row.setAttribute('aria-selected', String(place === this.at));

@@ -78,6 +78,11 @@ export class Placing {
     this.waiting = false;
   }
 
+  /** More lines are drawn, which follow, too. @param {Group[]} groups */
+  more(groups) {
+    for (const group of groups) this.groups.set(group.id, group);
+  }
+
   /** Whether this can be dragged, to ask for that. @param {string} id @param {string} [asks] @returns {boolean} */
   can(id, asks = 'place') {
     return this.owner && this.link.takes.has(asks) && /^n\d/.test(id) && this.constants.scale > 0 && this.drawn();

@@ -7,7 +7,8 @@
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {import('./place.js').Placing} Placing */
 /** What a pointer must know of the page: the id of what lies under a pixel, and how to draw anew.
- * @typedef {{pointed: (x: number, y: number) => string, redraw: () => void}} Ground */
+ * what a click on it does
+ * @typedef {{pointed: (x: number, y: number) => string, pressed: (id: string) => void, redraw: () => void}} Ground */
 
 /** How far a pointer may move, in pixels of a page, before a click is a drag. */
 const STILL = 5;
@@ -84,7 +85,7 @@ export class Pointer {
   /** A click holds; a neuron stays where it was dragged to. @param {PointerEvent} event */
   up(event) {
     const [x, y] = pixel(event);
-    if (this.dragged < STILL && event.button === 0) this.attention.hold(this.ground.pointed(x, y));
+    if (this.dragged < STILL && event.button === 0) this.ground.pressed(this.ground.pointed(x, y));
     if (this.clamp && this.dragged >= STILL) this.hold(event, false);
     this.placing.drop();
     this.on = '';

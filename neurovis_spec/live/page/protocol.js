@@ -25,10 +25,13 @@ import { isStill } from './camera.js';
  *   ranges: [number | null, number | null, number][], ranged: number[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
  *   themed: boolean, named: string[][], names: number[], curves: Curve[], order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
- *   told: string[], groups: Group[]}} Scene */
+ *   told: string[], boxes: Object<string, number[]>, groups: Group[]}} Scene */
 /** Signals in one axis, by what they are asked for, the first in front, and their names.
  * @typedef {{items: string[], names: string[]}} Curve */
 /** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */
+/** All connections of what is held: how many come into it, leave it, stay within, and are not drawn even so; those lines
+ * that the picture leaves out.
+ * @typedef {{of: string, inputs: number, outputs: number, within: number, undrawn: number, groups: Group[]}} Told */
 /** The spikes of some neurons, a row each: in cells (rows × bins) the share that fires, in 254ths, 255 where nothing is known; the
  * names of the first and the last.
  * @typedef {{id: string, first: number, every: number, bins: number, rows: number, ends: string[], cells: Uint8Array}} Raster */
@@ -51,7 +54,7 @@ import { isStill } from './camera.js';
  *   | {type: 'refused', reason: string}} Message */
 /** @typedef {{scene: (scene: Scene) => void, frame: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
  *   left: (traces: Traces) => void,
- *   raster: (raster: Raster) => void,
+ *   raster: (raster: Raster) => void, held: (told: Told) => void,
  *   text: (message: Message) => void, link: (open: boolean) => void}} Listener */
 
 /** Where little is to move, frames are taken over so many milliseconds after each other: fewer than three flashes a second. */
@@ -62,12 +65,18 @@ const SCENE = 1,
   FILE = 4,
   RASTER = 5,
   LEFT = 6,
+  HELD = 7,
   HEAD = 40;
+
+/** Unpack what is compressed behind a head. @param {ArrayBuffer} buffer */
+async function unzip(buffer) {
+  const stream = new Blob([buffer.slice(4)]).stream().pipeThrough(new DecompressionStream('gzip'));
+  return JSON.parse(await new Response(stream).text());
+}
 
 /** Unpack a scene. @param {ArrayBuffer} buffer @returns {Promise<Scene>} */
 async function unpack(buffer) {
-  const stream = new Blob([buffer.slice(4)]).stream().pipeThrough(new DecompressionStream('gzip'));
-  const scene = JSON.parse(await new Response(stream).text());
+  const scene = await unzip(buffer);
   scene.version = new DataView(buffer).getUint16(2, true);
   return scene;
 }
@@ -264,6 +273,8 @@ export class Link {
       this.listener.left(unpackTraces(data, this.scene));
     } else if (kind === RASTER && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.raster(unpackRaster(data, this.scene));
+    } else if (kind === HELD && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
+      this.listener.held(await unzip(data));
     }
   }
 

@@ -27,7 +27,7 @@ const within = ([x0, y0, x1, y1], [x, y]) => x >= x0 && x <= x1 && y >= y0 && y 
 export class Zoom {
   constructor() {
     /** @type {Scene | null} */
-    this.scene = null;
+    this.scene = this.whole = null;
     /** @type {Box[]} */
     this.boxes = [];
     /** the boxes that are closed now @type {Box[]} */
@@ -56,7 +56,19 @@ export class Zoom {
       })
       .filter(({ members }) => members.length);
     for (const box of this.boxes) box.holds = this.boxes.some((other) => other !== box && within(box.rect, other.rect));
-    this.scene = scene;
+    this.scene = this.whole = scene;
+    this.made = null;
+  }
+
+  /** Draw lines, too, which the picture leaves out. @param {Group[]} lines */
+  more(lines) {
+    const { whole } = this;
+    if (!whole || (!lines.length && this.scene === whole)) return;
+    // above the others, below bundles
+    const { groups } = whole,
+      last = groups.reduce((at, { data }, place) => (data.connection === undefined ? at : place + 1), 0),
+      at = last || groups.findIndex(({ data }) => data.neuron !== undefined);
+    this.scene = lines.length ? { ...whole, groups: [...groups.slice(0, at), ...lines, ...groups.slice(at)] } : whole;
     this.made = null;
   }
 

@@ -1,0 +1,211 @@
+"""What is held in the live page shows all its connections, also those for which the picture has no room."""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+import json
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_live_browser import pause, shown
+from test_live_looking import TIP, places, told
+from test_live_server import Eyes, Live, served
+from test_live_zoom import picture
+from test_scene_bundles import LAYERS
+
+import neurovis_spec as nv
+from neurovis_spec.live.held import told_of
+from neurovis_spec.live.view import View, view_of
+
+#: The second layer in a box; what a picture draws of 90 connections is a part.
+BOXED = LAYERS.replace("B: {count: 8}", "B: {count: 8, box: second}").replace("engine: grid", "engine: layered")
+PAIRS = """
+neurovis: 1
+name: pairs
+neurons: {A: {count: 4}, B: {count: 4}}
+connections: {A -> B: {pattern: all_to_all, weight: 1, symmetric: true}, A1 -> A1: 1}
+layout: {engine: grid}
+"""
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures have room for 20 lines."""
+    for name, number in {"_ALL": 20, "_MOST_LINES": 20, "_LINES_EACH": 1}.items():
+        monkeypatch.setattr(f"neurovis_spec.scene.shown.{name}", number)
+
+
+def asked(seen: View, item: str, weights: np.ndarray | None = None) -> dict[str, Any]:
+    first = seen.drawn.network.connections.weights.whole()
+    found = json.loads(gzip.decompress(told_of(seen, item, first if weights is None else weights)))
+    assert isinstance(found, dict)
+    return found
+
+
+@cache
+def view(text: str) -> View:
+    compiled = nv.compile_text(text)
+    return view_of(compiled, compiled.gains)
+
+
+def item_of(seen: View, name: str, kind: str = "") -> tuple[str, set[int]]:
+    """The id of what is held, and its neurons."""
+    names = seen.drawn.network.neurons.names
+    own = set(seen.plan.boxes[f"{kind}:{name}"]) if kind else {names.index(name)}
+    return f"{kind}:{name}" if kind else f"n{names.index(name)}", own
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "kind"),
+    [
+        (BOXED, "A2", ""),
+        (BOXED, "B8", ""),
+        (BOXED, "second", "box"),
+        (PAIRS, "A1", ""),
+        (LAYERS + "render: {collapse: [A]}\n", "A", ""),
+    ],
+)
+def test_what_the_picture_leaves_out_of_what_is_held_is_told(text: str, name: str, kind: str) -> None:
+    seen = view(text)
+    item, own = item_of(seen, name, kind)
+    ends, counts = seen.drawn.network.connections, seen.drawn.counts.tolist()
+    found = asked(seen, item)
+    pairs = list(zip(ends.sources.tolist(), ends.targets.tolist(), strict=True))
+    every = {index for index, (a, b) in enumerate(pairs) if a in own or b in own}
+    told = {int(group["id"][1:]) for group in found["groups"]}
+    second = set(ends.second.tolist())
+    assert not told & seen.plan.lines.keys()
+    assert told | (seen.plan.lines.keys() & every) == {
+        int(ends.twins[index]) if ends.twins is not None and index in second else index for index in every
+    }
+    into = sum(counts[i] for i in every if pairs[i][0] not in own)
+    out = sum(counts[i] for i in every if pairs[i][1] not in own)
+    assert (found["inputs"], found["outputs"]) == (into, out)
+    assert into + out + found["within"] == sum(counts[i] for i in every)
+    for group in found["groups"]:
+        assert group["title"].startswith(group["data"]["from"])
+        assert [shape["kind"] for shape in group["shapes"]][:2] == ["line", "head"]
+
+
+def test_of_a_bundle_it_is_what_is_left_out_of_its_pathway_and_of_nothing_nothing() -> None:
+    seen = view(BOXED)
+    for item, pathway in seen.plan.left.items():
+        found = asked(seen, item)
+        assert {int(group["id"][1:]) for group in found["groups"]} == set(pathway.members.tolist())
+        assert found["within"] == pathway.count
+    for item in ("n999", "c999", "box:nobody", "bundle:A -> nobody"):
+        assert asked(seen, item) == {
+            "of": item,
+            **dict.fromkeys(("inputs", "outputs", "within", "undrawn"), 0),
+            "groups": [],
+        }
+
+
+def test_of_very_many_the_strongest_by_the_weights_of_now_are_drawn_and_all_counted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("neurovis_spec.live.held.MOST", 3)
+    seen = view(BOXED)
+    hidden = sorted(set(range(90)) - seen.plan.lines.keys())
+    weights = np.zeros(90)
+    weights[hidden[10:13]] = 5, -7, np.nan
+    weights[hidden[14]] = -0.5
+    found = asked(seen, "box:second", weights)
+    assert [group["id"] for group in found["groups"]] == [f"c{hidden[place]}" for place in (10, 11, 14)]
+    assert found["undrawn"] == len(hidden) - 3
+    assert found["inputs"] + found["outputs"] + found["within"] == 90
+
+
+@pytest.mark.parametrize("owner", [True, False])
+def test_whoever_asks_is_told_and_who_asks_again_is_told_of_that(owner: bool) -> None:
+    async def test(live: Live) -> None:
+        async with live.stream(live.access.owner if owner else live.access.viewer) as stream:
+            found = list[dict[str, Any]]()
+            eyes = Eyes(stream)
+            await eyes.until(lambda: eyes.step > 2)
+            for of in ("n3", "c0", "box:none"):
+                await stream.send_json({"type": "connections", "of": of})
+            while not found or found[-1]["of"] != "box:none":
+                message = await stream.receive(30)
+                if isinstance(message.data, bytes) and message.data[0] == 7:
+                    found.append(json.loads(gzip.decompress(message.data[4:])))
+            assert [one["of"] for one in found] in (["n3", "box:none"], ["n3", "c0", "box:none"], ["c0", "box:none"])
+            counts = {one["of"]: (one["inputs"], one["outputs"], one["within"], one["groups"]) for one in found}
+            assert counts.get("n3", (3, 3, 0, [])) == (3, 3, 0, [])
+            assert counts.get("c0", (0, 0, 1, [])) == (0, 0, 1, [])
+
+    served(test)
+
+
+@pytest.mark.browser
+def test_what_is_held_is_drawn_listed_and_counted_with_the_weights_of_now(tmp_path: Path) -> None:
+    text = BOXED.replace("count: 6, bias: 1}", "count: 6, activation: tanh, bias: 1}").replace(
+        "steps: 3", "steps: 3, dt: 0.05"
+    )
+    (tmp_path / "layers.yaml").write_text(text.replace("count: 8,", "count: 8, activation: tanh,"))
+    rows = "[...document.querySelectorAll('#found li')].map((row) => row.textContent)"
+
+    async def main() -> None:
+        async with shown(str(tmp_path / "layers.yaml"), tmp_path) as (opened, compiled, _):
+            await opened.until("Number(document.querySelector('#told').textContent.split(' ')[1]) > 9")
+            step = await pause(opened)
+            seen = view_of(compiled, compiled.gains)
+            network, lines = compiled.network, seen.plan.lines
+            ends, names = network.connections, network.neurons.names
+            at = places(compiled)
+
+            await opened.click(*at["B3"])
+            await told(opened, "B3")
+            own = [i for i in range(len(ends)) if "B3" in (names[ends.sources[i]], names[ends.targets[i]])]
+            into = sum(names[ends.targets[i]] == "B3" for i in own)
+            hidden = [i for i in own if i not in lines]
+            assert hidden
+            await opened.until(f"{TIP}.textContent.includes('connections {into} in, {len(own) - into} out')")
+            await opened.point(2, 2)
+            await picture(opened)
+            pixels = np.array(await picture(opened)).astype(int).min(axis=2)
+            groups = asked(seen, f"n{names.index('B3')}")["groups"]
+            assert {int(group["id"][1:]) for group in groups} == set(hidden)
+            for group in groups:
+                a, b, c, d = np.reshape(group["shapes"][0]["points"][:8], (4, 2)) * seen.plan.frame.density
+                x, y = np.rint((a + 3 * b + 3 * c + d) / 8).astype(int)
+                assert pixels[y - 2 : y + 3, x - 2 : x + 3].min() < 180, "the line is there, and all else recedes"
+            # the outline has the same, each with its weight of this step
+            await opened.key("o")
+            await opened.until(
+                f"{rows}.length == {1 + len(own)} && {rows}.slice(1, 9).every((row) => /weight /.test(row))"
+            )
+            weights, listed = compiled.run(step + 1).snapshot(step).weights, await opened.ask(rows)
+            assert isinstance(listed, list)
+            called = {network.connection_names[i].replace("->", "→"): i for i in own}
+            assert {str(row).split(" weight ")[0] for row in listed[1:9]} <= called.keys()
+            for row in listed[1:9]:
+                name, _, rest = str(row).partition(" weight ")
+                value = float(re.split("[, ]", rest)[0].replace("−", "-"))
+                assert value == pytest.approx(weights[called[name]], rel=1e-5)
+            # a box has all of its neurons', a bundle what is left out of its pathway; Escape lets go of both
+            await opened.ask("Object.assign(document.querySelector('#search'), {value: 'second'}).oninput()")
+            await opened.until(f"{rows}.length > 0")
+            await opened.key("Enter")
+            await opened.until(f"/connections 48 in, 32 out, 10 within/.test({TIP}.textContent)")
+            await opened.ask("Object.assign(document.querySelector('#search'), {value: 'B → A'}).oninput()")
+            await opened.until(f"{rows}[0]?.startsWith('B → A ·')")
+            await opened.key("Enter")
+            await opened.until(f"{TIP}.textContent.startsWith('B → A ·')")
+            await opened.ask("Object.assign(document.querySelector('#search'), {value: ''}).oninput()")
+            left = sum(
+                names[ends.sources[i]][0] == "B" and names[ends.targets[i]][0] == "A" and i not in lines
+                for i in range(len(ends))
+            )
+            await opened.until(f"{rows}.filter((row) => /^B\\d+ → A/.test(row)).length == {left}")
+            await opened.key("Escape")
+            await opened.ask("document.querySelector('#picture').focus()")
+            await opened.key("Escape")
+            await opened.until(f"{TIP}.hidden")
+
+    asyncio.run(main())
