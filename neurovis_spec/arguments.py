@@ -122,6 +122,16 @@ def several(name: str, values: Iterable[Item], what: str) -> Iterable[Item]:
     return values
 
 
+def pair(name: str, value: object) -> tuple[object, object]:
+    """Two values."""
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        raise _wrong(name, "a pair", value)
+    values: tuple[object, ...] = tuple(value)
+    if len(values) != 2:
+        raise ValueError(f"'{name}' is a pair, not {len(values)} values")
+    return values[0], values[1]
+
+
 def instance(name: str, value: object, kind: type[Kind], what: str) -> Kind:
     """A value of this kind."""
     if not isinstance(value, kind):

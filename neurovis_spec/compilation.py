@@ -72,15 +72,17 @@ class Compilation:
         effort: str | None = None,
         earlier: Layout | None = None,
         progress: Progress | None = None,
+        size: tuple[int, int] | None = None,
     ) -> Layout:
-        """A layout, made anew by this engine, or the spec's. What an ``earlier`` one knew stays where it was. Raises
-        LayoutRefusalError, which knows where the spec asks for what an engine cannot do."""
+        """A layout, made anew by this engine, or the spec's, for a page of this ``size``, or the spec's. What an
+        ``earlier`` one knew stays where it was. Raises LayoutRefusalError, which knows where the spec asks for what an
+        engine cannot do."""
         from neurovis_spec.layout.arrange import lay_out_problem
-        from neurovis_spec.layout.model import LayoutRefusalError, effort_of
+        from neurovis_spec.layout.model import LayoutRefusalError
         from neurovis_spec.layout.where import where
 
         try:
-            problem = replace(self.problem, effort=effort_of(effort or "normal"))
+            problem = self._asked(effort, size)
             if earlier is not None:
                 problem = replace(problem, memory=earlier)
             return lay_out_problem(problem, engine or self.network.layout.engine, progress)
@@ -90,21 +92,29 @@ class Compilation:
                 refusal.locate(span, self.sources)
             raise
 
+    def _asked(self, effort: str | None, size: tuple[int, int] | None) -> LayoutProblem:
+        """The problem, with this effort and for a page of this size."""
+        from neurovis_spec.layout.model import effort_of
+        from neurovis_spec.layout.problem import aspect_of
+
+        problem = replace(self.problem, effort=effort_of(effort or "normal"))
+        return problem if size is None else replace(problem, aspect=aspect_of(size))
+
     @cached_property
-    def _layouts(self) -> dict[tuple[str | None, str], Layout]:
+    def _layouts(self) -> dict[tuple[str | None, str, tuple[int, int] | None], Layout]:
         return {}
 
-    def placed(self, engine: str | None = None, effort: str | None = None) -> Layout:
-        """The layout that pictures are drawn in, by this engine or the spec's; computed once, here or when the same was
-        asked for before (``layout/kept.py``). Raises LayoutRefusalError."""
-        key = engine, effort or "normal"
+    def placed(
+        self, engine: str | None = None, effort: str | None = None, size: tuple[int, int] | None = None
+    ) -> Layout:
+        """The layout that pictures of this size, or the spec's, are drawn in, by this engine or the spec's; computed
+        once, here or when the same was asked for before (``layout/kept.py``). Raises LayoutRefusalError."""
+        key = engine, effort or "normal", size or self.network.render.size
         if key not in self._layouts:
             from neurovis_spec.layout.kept import kept
-            from neurovis_spec.layout.model import effort_of
 
-            problem = replace(self.problem, effort=effort_of(key[1]))
-            make = partial(self.arranged, engine, effort)
-            self._layouts[key] = kept(problem, engine or self.network.layout.engine, make)
+            make = partial(self.arranged, engine, effort, size=size)
+            self._layouts[key] = kept(self._asked(effort, size), engine or self.network.layout.engine, make)
         return self._layouts[key]
 
     def settings_for(self, theme: str | None) -> RenderSettings:

@@ -40,6 +40,7 @@ from neurovis_spec.keywords import (
     keep_of,
     keywords,
     panels_of,
+    size_of,
     still_of,
     weights_alone,
 )
@@ -258,11 +259,13 @@ class CompiledNetwork(Compilation):
         check(engine=engine, effort=effort, earlier=earlier, progress=progress)
         return NetworkLayout(self, self.arranged(engine, effort, earlier, progress))
 
-    def drawn(self, engine: str | None = None, effort: str | None = None) -> NetworkLayout:
-        """The layout that pictures are drawn in, by this engine or the spec's; computed once. Raises what ``layout``
-        raises."""
+    def drawn(
+        self, engine: str | None = None, effort: str | None = None, size: tuple[int, int] | None = None
+    ) -> NetworkLayout:
+        """The layout that pictures of this ``size``, or the spec's, are drawn in, by this engine or the spec's;
+        computed once. Raises what ``layout`` raises."""
         check(engine=engine, effort=effort)
-        return NetworkLayout(self, self.placed(engine, effort))
+        return NetworkLayout(self, self.placed(engine, effort, None if size is None else size_of(size)))
 
     @keywords(StillKeywords, STILL)
     def render(self, path: str | Path, **options: Unpack[StillKeywords]) -> None:
@@ -280,7 +283,8 @@ class CompiledNetwork(Compilation):
         ``collapse`` names groups and instances that are one glyph each in the picture of the network, ``focus``
         neurons that are shown with all they are connected to, ``paths`` (``"A -> B"``) what the shortest paths are
         shown of; connections below ``min_weight`` are left out. Of very many connections, and of those that would make
-        an SVG larger than 5 MB, the weakest are left out, with a warning, unless it is to be ``full``. Raises
+        an SVG larger than 5 MB, the weakest are left out, with a warning, unless it is to be ``full``. ``size`` are its
+        width and height in pixels, for which it is laid out, by default the spec's. Raises
         RendererError for a kind that nobody draws, for a view, a name to be shown and a path that there is not,
         KeyError for an unknown reference, before anything is run.
         """
@@ -455,7 +459,8 @@ class NetworkLayout:
         """What ``neurovis layout --metrics`` prints, but for the seconds."""
         from neurovis_spec.layout.metrics import metrics
 
-        return metrics(self.value, self.compiled.problem)
+        problem = self.compiled.problem
+        return metrics(self.value, replace(problem, direction=self.value.direction or problem.direction))
 
     def dump(self) -> str:
         """The layout file as a text."""

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from neurovis_spec import arguments
 from neurovis_spec.arguments import callers_level
 from neurovis_spec.compilation import Compilation
-from neurovis_spec.compiler.drawing.drawing_settings import Panel
+from neurovis_spec.compiler.drawing.drawing_settings import LEAST_SIDE, MOST_PIXELS, MOST_SIDE, Panel
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
 
@@ -87,6 +87,7 @@ class PictureKeywords(TypedDict, total=False):
     paths: str | None
     min_weight: float | None
     full: bool
+    size: tuple[int, int] | None
 
 
 class StillKeywords(PictureKeywords, total=False):
@@ -137,6 +138,7 @@ PICTURE: Final[PictureKeywords] = {
     "paths": None,
     "min_weight": None,
     "full": False,
+    "size": None,
 }
 STILL: Final[StillKeywords] = {"step": None, "effort": None, "window": None, "dpi": None, **PICTURE}
 FILM: Final[FilmKeywords] = {"steps": None, "start": 0, "fps": None, "every": None, "frames": None, **PICTURE}
@@ -295,7 +297,18 @@ def _look_of(of: Compilation, path: Path, given: PictureKeywords) -> Look:
     settings, asked = of.settings_for(given["theme"]), view is not None or bool(of.network.render.figure)
     look = with_views(Look(settings, (), asked, engine=given["engine"], suffix=path.suffix.lower()), panels)
     settings = excerpted(of.network, look.settings, excerpt)
+    if given["size"] is not None:
+        settings = replace(settings, size=size_of(given["size"]))
     return replace(look, settings=settings if look.shows("network") else replace(settings, collapse=()))
+
+
+def size_of(given: object) -> tuple[int, int]:
+    """The sides of a picture in pixels. Raises TypeError, ValueError."""
+    sides = arguments.pair("size", given)
+    wide, high = (arguments.integer("size", side, LEAST_SIDE, MOST_SIDE) for side in sides)
+    if wide * high > MOST_PIXELS:
+        raise ValueError(f"a picture has at most {MOST_PIXELS:,} pixels, this one {wide * high:,}")
+    return wide, high
 
 
 def panels_of(

@@ -192,7 +192,7 @@ def filmed(of: Compilation, look: Look, run: Run, progress: Progress | None = No
     from neurovis_spec.scene.shots import shots_of
 
     network = of.network
-    layout = of.placed(look.engine, look.effort) if needs_layout(network, look) else None
+    layout = of.placed(look.engine, look.effort, look.settings.size) if needs_layout(network, look) else None
     recording = recorded(network, run, progress)
     seen = with_body_if_any(look, recording)
     shots = shots_of(network, recording, seen)
@@ -218,7 +218,7 @@ def films_of(of: Compilation, look: Look, run: Run, progress: Progress | None = 
     from neurovis_spec.scene.shots import in_parts, shots_of, snapshots_of_run
 
     network = of.network
-    layout = of.placed(look.engine, look.effort) if needs_layout(network, look) else None
+    layout = of.placed(look.engine, look.effort, look.settings.size) if needs_layout(network, look) else None
     gains = gains_by(seen_by(of, look), look, run)
     snapshots: Iterable[Snapshot]
     if isinstance(run, Recording):

@@ -39,6 +39,7 @@ WRONG: dict[str, tuple[object, ...]] = {
     "a text, several, or a mapping": (5, None, 1.5),
     "a range or numbers": (5, None, 1.5),
     "a view, {view: references}, or several": (5, 1.5, True),
+    "a pair": (5, "800x600", True),
 }
 #: what may be left out: None stands for the default
 OPTIONAL = {
@@ -56,7 +57,7 @@ OPTIONAL = {
     "dpi",
     "focus",
 }
-OPTIONAL |= {"paths", "min_weight", "every", "frames"}
+OPTIONAL |= {"paths", "min_weight", "every", "frames", "size"}
 OVER = {"seed": [1]}
 CALLS: dict[tuple[str, str, str], Callable[..., object]] = {
     ("compile", "source", "a path"): lambda v: nv.compile(v),
@@ -98,6 +99,7 @@ CALLS: dict[tuple[str, str, str], Callable[..., object]] = {
     ("render", "focus", "a text"): lambda v: NETWORK.render("x.svg", focus=v),
     ("render", "paths", "a text"): lambda v: NETWORK.render("x.svg", paths=v),
     ("render", "min_weight", "a number"): lambda v: NETWORK.render("x.svg", min_weight=v),
+    ("render", "size", "a pair"): lambda v: NETWORK.render("x.svg", size=v),
     ("render", "full", "True or False"): lambda v: NETWORK.render("x.svg", full=v),
     ("animate", "every", "an integer"): lambda v: NETWORK.animate("x.svg", every=v),
     ("animate", "frames", "an integer"): lambda v: NETWORK.animate("x.svg", frames=v),
@@ -220,7 +222,19 @@ def test_numbers_of_any_make_are_taken() -> None:
 
 
 RUN = ("backend", "every", "start", "until", "progress", "states", "neurons", "weights", "signals", "checkpoint")
-PICTURE = ("recording", "inputs", "theme", "engine", "view", "progress", "collapse", "focus", "paths", "min_weight")
+PICTURE = (
+    "recording",
+    "inputs",
+    "theme",
+    "engine",
+    "view",
+    "progress",
+    "collapse",
+    "focus",
+    "paths",
+    "min_weight",
+    "size",
+)
 
 
 @pytest.mark.parametrize(

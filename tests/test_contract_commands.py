@@ -123,7 +123,8 @@ def test_what_may_take_longer_than_a_second_shows_a_bar_on_a_terminal(
     "words",
     [
         "animate small.yaml -o x.svg --fps nan", "animate small.yaml -o x.svg --fps inf",
-        "render small.yaml -o x.png --dpi nan", "validate small.yaml --limit 0",
+        "render small.yaml -o x.png --dpi nan", "render small.yaml -o x.png --size 800",
+        "render small.yaml -o x.png --size 20000x3000", "validate small.yaml --limit 0",
         "validate small.yaml --root small.yaml", "run small.yaml --root nowhere", "run small.yaml --set gain=nan",
         "inspect small.yaml --format yaml", "schema more", "new", "docs a b", "fmt", "layout small.yaml --engine -",
     ],

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import neurovis_spec as nv
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout import Layout
 from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.file import parse
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import LayoutProblem
 from neurovis_spec.layout.problem import problem_of
@@ -57,7 +61,7 @@ def test_a_long_chain_stands_in_bands_without_a_crossing(text: str, direction: s
 
 
 def test_bands_are_read_like_columns_of_a_text() -> None:
-    _, layout = drawn(LINE)
+    _, layout = drawn(f"{LINE}layout: {{direction: down}}\n")
     columns: dict[float, list[str]] = {}
     for name, (x, y) in sorted(layout.positions.items(), key=lambda item: item[1]):
         columns.setdefault(x, []).append(name)
@@ -80,7 +84,7 @@ def test_legs_of_fifteen_ranks_fold_alike_and_mirror_images_are_exact() -> None:
 
 
 def test_what_is_near_to_a_page_runs_one_way() -> None:
-    problem, layout = drawn(LINE.replace("30", "11"))
+    problem, layout = drawn(f"{LINE}layout: {{direction: down}}\n".replace("30", "11"))
     assert metrics(layout, problem)["flow"] == 1
 
 
@@ -89,6 +93,42 @@ def test_the_size_of_the_picture_is_that_of_the_page() -> None:
     _, high = drawn(f"{CHAIN}render: {{size: [400, 1200]}}\n")
     assert stretched(wide, 3) < 2
     assert stretched(high, 1 / 3) < 2
+
+
+@pytest.mark.parametrize("size", [(400, 1200), (1200, 400)])
+def test_a_picture_is_laid_out_for_the_page_that_is_asked_for(tmp_path: Path, size: tuple[int, int]) -> None:
+    """Without a size it is as ever; the direction, where the author says none, is that which fills the page better."""
+    names = [f"n{i}" for i in range(8)]
+    text = f"neurovis: 1\nname: line\nneurons: {{{': {}, '.join(names)}: {{}}}}\nconnections:\n"
+    text += "".join(f"  {a} -> {b}: 1\n" for a, b in pairwise(names))
+    long = size[1] > size[0]
+
+    def across(network: nv.CompiledNetwork, size: tuple[int, int] | None = None) -> list[float]:
+        """How far discs are apart to the side and down."""
+        network.render(tmp_path / "x.svg", step=0, size=size)
+        found = re.findall(r'<circle[^>]* cx="([^"]*)" cy="([^"]*)"', (tmp_path / "x.svg").read_text())
+        wide, high = np.ptp(np.array(found[-len(names) :], float), axis=0)
+        return [float(wide), float(high)]
+
+    network = nv.compile_text(text)
+    wide, high = across(network, size)
+    assert (high > 400 and not wide) if long else (wide > 400 and not high)
+    for spec, page in (
+        (text, None),
+        (f"{text}layout: {{direction: down}}\n", size),
+        (f"{text}layout: {{arrange: {{n0: column}}}}\n", size),
+    ):
+        assert not across(nv.compile_text(spec), page)[0]
+    written = nv.compile_text(f"{text}render: {{size: [{size[0]}, {size[1]}]}}\n")
+    assert across(written) == [wide, high]
+    # what remembers it keeps it, on any page
+    made = written.layout()
+    assert made.metrics()["flow"] == 1
+    assert parse(made.dump(), "x.layout", Findings()) == made.value
+    assert network.layout(earlier=made.value).positions == made.positions
+    new = nv.compile_text(f"{text}  n7 -> m: 1\n".replace("n7: {}", "n7: {}, m: {}")).layout(earlier=made.value)
+    (x, y), (mx, my) = (new.positions[name] for name in ("n7", "m"))
+    assert (my > y and mx == x) if long else (mx > x and my == y)
 
 
 def test_neurons_in_no_instance_and_no_group_run_one_way_unless_a_page_is_asked_for() -> None:

@@ -71,6 +71,7 @@ def test_any_part_may_be_missing() -> None:
         ("postions: {}", "unknown-key", (2, 1), "unknown key 'postions'"),
         ("network: 3", "wrong-type", (2, 10), "'network' is a name, found the number 3"),
         ("positions: [1]", "wrong-type", (2, 12), "'positions' is a mapping"),
+        ("direction: aside", "wrong-type", (2, 12), "'direction' is one of four, found the text 'aside'"),
         ("positions: {A: 1}", "wrong-type", (2, 16), "the position of 'A' is a pair [x, y], found the number 1"),
         ("positions: {A: [1]}", "wrong-type", (2, 16), "found a list of 1"),
         ("positions: {A: [1, x]}", "wrong-type", (2, 20), "has a number here, found the text 'x'"),

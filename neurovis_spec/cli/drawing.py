@@ -49,6 +49,7 @@ class Drawing:
     paths: str | None
     min_weight: float | None
     full: bool
+    size: tuple[int, int] | None
     settings: dict[str, float | str]
 
     def made_for(self, output: Path) -> tuple[CompiledNetwork, PictureKeywords]:
@@ -69,13 +70,29 @@ class Drawing:
             "paths": self.paths,
             "min_weight": self.min_weight,
             "full": self.full,
+            "size": self.size,
         }
 
 
 def show_warnings(network: CompiledNetwork, given: PictureKeywords, effort: str | None = None) -> None:
     """Write the warnings about the layout, where one was drawn, to standard error."""
     if network.needs_layout(given["view"]):
-        show(network.drawn(given["engine"], effort).warnings, network.sources)
+        show(network.drawn(given["engine"], effort, given["size"]).warnings, network.sources)
+
+
+def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
+    """Width and height, of WIDTHxHEIGHT."""
+    from neurovis_spec.keywords import size_of
+
+    if value is None:
+        return None
+    sides = value.lower().replace("×", "x").split("x")
+    if len(sides) != 2 or not all(side.isascii() and side.isdecimal() for side in sides):
+        raise click.BadParameter(f"'{value}' is not of the form WIDTHxHEIGHT, such as 800x600")
+    try:
+        return size_of([int(side) for side in sides])
+    except ValueError as fault:
+        raise click.BadParameter(str(fault)) from None
 
 
 def _views() -> Iterable[str]:
@@ -123,6 +140,12 @@ drawing_options: Final = as_one(
         help="Leave out connections with |w| below X.",
     ),
     click.option("--full", is_flag=True, help="Draw all connections, however many there are."),
+    click.option(
+        "--size",
+        metavar="WxH",
+        callback=_size,
+        help="Width and height in pixels, such as 400x1200, for which it is laid out; default: the spec's.",
+    ),
     engine_option,
     set_option,
     body_options,

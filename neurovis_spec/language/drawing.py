@@ -210,7 +210,9 @@ class LayoutModel(Model):
         "(default auto).",
     )
     direction: Annotated[Located[Direction], words(Direction)] | None = Field(
-        None, description="Where the signals go: down, up, right, left (default down)."
+        None,
+        description="Where the signals go: down, up, right, left; a page of a given size may have them go right "
+        "where this is left out (default down).",
     )
     positions: Annotated[Keyed[PointField], REFERENCES] = Field(
         default_factory=dict, description="Pins: {neuron: [x, y]}."

@@ -7,6 +7,7 @@ before it starts; what it gives back is checked, put on the grid of 1/1024 and m
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import cast
 
 from neurovis_spec.gc_paused import uncollected
@@ -14,6 +15,7 @@ from neurovis_spec.layout.choose import choose_engine
 from neurovis_spec.layout.engines import engine_of, refuse
 from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import (
+    Capabilities,
     Layout,
     LayoutProblem,
     LayoutRefusalError,
@@ -31,6 +33,7 @@ def lay_out_problem(problem: LayoutProblem, engine: str = "auto", progress: Prog
     """
     name = choose_engine(problem)[0] if engine == "auto" else engine
     chosen = engine_of(name)
+    problem = _as_remembered(problem, chosen.capabilities)
     refuse(problem, name, chosen.capabilities)
     with uncollected():
         if progress is not None and chosen.capabilities.progress:
@@ -39,6 +42,14 @@ def lay_out_problem(problem: LayoutProblem, engine: str = "auto", progress: Prog
             result = chosen.lay_out(problem)
         _check(problem, name, result)
         return _tidy(problem, name, result)
+
+
+def _as_remembered(problem: LayoutProblem, can: Capabilities) -> LayoutProblem:
+    """A problem of whose earlier layout the page chose the direction, in this."""
+    earlier = None if problem.memory is None else problem.memory.direction
+    if earlier is None or not (problem.turnable and can.direction):
+        return problem
+    return replace(problem, direction=earlier)
 
 
 def _check(problem: LayoutProblem, name: str, result: Layout) -> None:
@@ -90,4 +101,7 @@ def _tidy(problem: LayoutProblem, name: str, result: Layout) -> Layout:
         routes[edge.name] = (start, *(moved(point) for point in result.routes[edge.name][1:-1]), end)
     labelled = {neuron for neuron, room in zip(problem.neurons, problem.labels, strict=False) if room[0]}
     labels = {neuron: result.labels[neuron] for neuron in problem.neurons if neuron in labelled & result.labels.keys()}
-    return Layout(problem.network, name, positions, routes, labels)
+    direction = result.direction
+    if problem.turnable and problem.memory is not None and direction is None:
+        direction = problem.memory.direction
+    return Layout(problem.network, name, positions, routes, labels, direction)

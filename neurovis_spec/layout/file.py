@@ -22,12 +22,12 @@ from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST, read_content, read_text
 from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Scalar, SourceDocument, describe
-from neurovis_spec.layout.model import SIDES, Layout, Point, Route, Side
+from neurovis_spec.layout.model import DIRECTIONS, SIDES, Direction, Layout, Point, Route, Side
 from neurovis_spec.layout.naming import edge_key, natural_key
 from neurovis_spec.likeness import suggest
 
 VERSION = 1
-_KEYS = ("neurovis_layout", "network", "engine", "positions", "routes", "labels")
+_KEYS = ("neurovis_layout", "network", "engine", "direction", "positions", "routes", "labels")
 _NAME = r"[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*"
 _PLAIN = re.compile(rf"{_NAME}(?: -> {_NAME}(?: \([0-9]+\))?)?")
 #: What some YAML reader takes for something else than a text.
@@ -40,7 +40,8 @@ _LONG_KEY = 1000
 
 def dump(layout: Layout) -> str:
     """The layout as the text of a layout file: positions in natural order of the names, then every route, then on which
-    sides those labels stand for which there is room beside their discs.
+    sides those labels stand for which there is room beside their discs; before all these the direction that the page
+    chose, where it did.
 
     >>> print(dump(Layout("x", "grid", {"A": (0.0, 0.5)}, {})), end="")
     neurovis_layout: 1
@@ -55,6 +56,8 @@ def dump(layout: Layout) -> str:
         f"network: {name_text(layout.network)}",
         f"engine: {name_text(layout.engine)}",
     ]
+    if layout.direction is not None:
+        lines.append(f"direction: {layout.direction}")
     positions = sorted(layout.positions, key=natural_key)
     lines += _section("positions", [(name, _point(layout.positions[name])) for name in positions])
     routes = sorted(layout.routes, key=edge_key)
@@ -137,7 +140,8 @@ def _parsed(document: SourceDocument | None, before: int, findings: Findings) ->
         side = _read_side(node, name, findings)
         if side is not None:
             labels[name] = side
-    return None if findings.errors > before else Layout(network, engine, positions, routes, labels)
+    direction = _direction(root, findings)
+    return None if findings.errors > before else Layout(network, engine, positions, routes, labels, direction)
 
 
 def _check_version(root: Mapping, findings: Findings) -> None:
@@ -158,6 +162,18 @@ def _name(root: Mapping, key: str, default: str, findings: Findings) -> str:
         findings.error("wrong-type", node.span, f"'{key}' is a name, found {describe(node)}")
         return default
     return node.value
+
+
+def _direction(root: Mapping, findings: Findings) -> Direction | None:
+    node = root.get("direction")
+    value = node.value if isinstance(node, Scalar) else None
+    for direction in DIRECTIONS:
+        if direction == value:
+            return direction
+    if node is not None:
+        hint = suggest(value, DIRECTIONS, "directions") if isinstance(value, str) else None
+        findings.error("wrong-type", node.span, f"'direction' is one of four, found {describe(node)}", hint)
+    return None
 
 
 def _entries(root: Mapping, key: str, findings: Findings) -> list[tuple[str, Node]]:
@@ -256,4 +272,4 @@ def known_part(layout: Layout, network: Network, span: Span, findings: Findings)
     positions = {name: point for name, point in layout.positions.items() if name in network.neuron_index}
     routes = {name: route for name, route in layout.routes.items() if name in network.connection_index}
     labels = {name: side for name, side in layout.labels.items() if name in network.neuron_index}
-    return Layout(layout.network, layout.engine, positions, routes, labels)
+    return Layout(layout.network, layout.engine, positions, routes, labels, layout.direction)

@@ -23,7 +23,17 @@ import numpy as np
 
 from neurovis_spec import plugins
 from neurovis_spec.layout.choose import choose_engine
-from neurovis_spec.layout.model import SIDES, Layout, LayoutProblem, LayoutRefusalError, Point, Route, Side
+from neurovis_spec.layout.model import (
+    DIRECTIONS,
+    SIDES,
+    Direction,
+    Layout,
+    LayoutProblem,
+    LayoutRefusalError,
+    Point,
+    Route,
+    Side,
+)
 from neurovis_spec.user_cache import UserCache
 from neurovis_spec.version import __version__
 
@@ -100,20 +110,21 @@ def _version(package: str) -> str:
 
 
 def _written(layout: Layout) -> bytes:
-    parts = [layout.network, layout.engine, layout.positions, layout.routes, layout.labels]
+    parts = [layout.network, layout.engine, layout.positions, layout.routes, layout.labels, layout.direction]
     return json.dumps([dict(part) if isinstance(part, Mapping) else part for part in parts]).encode()
 
 
 def _read(data: bytes, problem: LayoutProblem) -> Layout | None:
     """The layout that was written so; None where it is none of this problem."""
     try:
-        network, engine, positions, routes, labels = json.loads(data)
+        network, engine, positions, routes, labels, direction = json.loads(data)
         layout = Layout(
             network,
             engine,
             {name: _point(point) for name, point in positions.items()},
             {name: _route(points) for name, points in routes.items()},
             {name: cast(Side, side) for name, side in labels.items() if side in SIDES},
+            cast(Direction, direction) if direction in DIRECTIONS else None,
         )
     except (ValueError, TypeError, AttributeError):
         return None

@@ -21,6 +21,7 @@ Point: TypeAlias = tuple[float, float]
 #: A cubic Bézier spline: 1 + 3k points from the centre of the source to the centre of the target.
 Route: TypeAlias = tuple[Point, ...]
 Direction = Literal["down", "up", "right", "left"]
+DIRECTIONS: tuple[Direction, ...] = ("down", "up", "right", "left")
 Arrangement = Literal["row", "column", "grid", "ring", "arc"]
 #: Where a label stands, in the picture, that its disc cannot hold.
 Side = Literal["right", "left", "below", "above"]
@@ -128,6 +129,8 @@ class LayoutProblem:
     rank_spacing: float = 2.0
     #: width by height that the drawing is to come near to; None where the author has not said
     aspect: float | None = None
+    #: whether nobody says the direction
+    turnable: bool = False
     #: where signals enter and leave the network: a hint on what comes first in a loop
     entries: tuple[int, ...] = ()
     exits: tuple[int, ...] = ()
@@ -162,6 +165,14 @@ class LayoutProblem:
         return tuple(place)
 
     @property
+    def turns(self) -> bool:
+        """Whether the page may choose the direction: one is asked for, and nothing that the author says, and no earlier
+        layout, holds by the one that there is."""
+        held = self.pins or self.arrange or self.mirrors or self.align or self.plan or self.memory is not None
+        held = held or any(module.pins or module.origin is not None for module in self.modules)
+        return self.turnable and self.aspect is not None and not held
+
+    @property
     def page(self) -> float:
         """Width by height of the page."""
         return PAGE if self.aspect is None else self.aspect
@@ -176,13 +187,15 @@ class LayoutProblem:
 @dataclass(frozen=True, slots=True)
 class Layout:
     """Where everything is: positions by neuron name, routes by connection name, neurons in natural order; on which side
-    of its disc a label stands for which room was kept there, by neuron name."""
+    of its disc a label stands for which room was kept there, by neuron name; the ``direction`` where the page
+    chose it."""
 
     network: str
     engine: str
     positions: Mapping[str, Point]
     routes: Mapping[str, Route]
     labels: Mapping[str, Side] = field(default_factory=dict)
+    direction: Direction | None = None
 
     def __repr__(self) -> str:
         sizes = f"{len(self.positions):,} positions, {len(self.routes):,} routes"

@@ -80,6 +80,8 @@ class NamedProblem:
     symmetric: Iterable[str] = ()
     #: the width of the page by its height, where one is asked for
     aspect: float | None = None
+    #: whether nobody says the direction, so that the page may choose it
+    turnable: bool = False
 
     def canonical(self) -> LayoutProblem:
         """The problem in canonical order: equal parts in any order give an equal problem. The members of a group and of
@@ -107,6 +109,7 @@ class NamedProblem:
             neuron_spacing=self.spacing[0],
             rank_spacing=self.spacing[1],
             aspect=self.aspect,
+            turnable=self.turnable,
             entries=members(self.entries),
             exits=members(self.exits),
             align=tuple(sorted(members(line) for line in self.align)),
@@ -258,8 +261,21 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
         labels=dict(zip(names, label_room(network), strict=False)),
         memory=memory,
         symmetric=_symmetric(network),
-        aspect=None if network.render.size is None else network.render.size[0] / network.render.size[1],
+        aspect=aspect_of(network.render.size),
+        turnable=not settings.directed,
     ).canonical()
+
+
+def aspect_of(size: tuple[int, int] | None) -> float | None:
+    """The width of a page by its height; None where none is asked for."""
+    return None if size is None else size[0] / size[1]
+
+
+def in_direction(network: Network, layout: Layout | None) -> Network:
+    """The network with the direction in which a layout draws it, where the page chose it."""
+    if layout is None or layout.direction is None:
+        return network
+    return replace(network, layout=replace(network.layout, direction=layout.direction))
 
 
 def _symmetric(network: Network) -> list[str]:

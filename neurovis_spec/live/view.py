@@ -20,6 +20,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SPIKE, SYNAPSE
 from neurovis_spec.layout.model import RADIUS, Layout
+from neurovis_spec.layout.problem import in_direction
 from neurovis_spec.live.commands import AS_IT_IS, Appearance
 from neurovis_spec.live.curves import Curves, curves_of
 from neurovis_spec.live.declared import declared
@@ -228,11 +229,12 @@ def view_of(
     """How a compiled network is drawn, by default in the layout of an engine. ``gains`` are of what its ``appearance``
     shows, each neuron or each group; ``otherwise`` draws it in another one, by default with the same gains. Raises
     LayoutRefusalError, RendererError."""
-    network = compiled.network
+    layout = compiled.placed(engine) if layout is None else layout
+    network = in_direction(compiled.network, layout)
     settings = replace(compiled.settings_for(appearance.theme or theme), pathways=appearance.pathways)
     drawn = gathered(network, settings.collapse, settings.pathways)
     seen = appearance.gains(gains)
-    stands = laid_out(drawn, compiled.placed(engine) if layout is None else layout)
+    stands = laid_out(drawn, layout)
     planned = plan(drawn, stands, seen, settings)
     largest = np.ones(len(seen.thickness))
     for scale in seen.thickness_scales:

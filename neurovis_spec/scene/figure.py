@@ -14,6 +14,7 @@ from typing import NamedTuple
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
+from neurovis_spec.layout.problem import in_direction
 from neurovis_spec.scene.body import PLOT, BodyPicture
 from neurovis_spec.scene.caption import HEADER, MOST_TITLE, caption, caption_text, lowered, title_lines
 from neurovis_spec.scene.encode import CAPTION
@@ -62,7 +63,7 @@ def figure(network: Network, layout: Layout | None, look: Look, shots: Shots, ga
     if not look.panels:
         assert gains.picture is not None
         return film(network, layout, shots.snapshots(network), gains.picture, look.settings, look.fps or 1.0)
-    settings = look.settings
+    network, settings = in_direction(network, layout), look.settings
     explained = look.shows("network") and settings.legend
     maker = Maker(network, layout, shots, gains.each, explained, settings.min_weight)
     others = {number: maker.block(panel) for number, panel in enumerate(look.panels) if panel.view != "network"}

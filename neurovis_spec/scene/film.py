@@ -17,6 +17,7 @@ import numpy.typing as npt
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
+from neurovis_spec.layout.problem import in_direction
 from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.collapse import Gathered, gathered
 from neurovis_spec.scene.encode import CAPTION, Looks, lesions_by_id, looks, paint, tooltips
@@ -79,7 +80,7 @@ def films(
     """The same for a film that comes in parts, each made when it is asked for. What stays the same is planned anew only
     where other weights are reached. Of pathways that are ``laid_out_alone`` the layout may be None. Raises ValueError
     for a part without a snapshot."""
-    drawn = gathered(network, settings.collapse, settings.pathways)
+    drawn = gathered(in_direction(network, layout), settings.collapse, settings.pathways)
     placed, planned, reached, begin = laid_out(drawn, layout), None, np.zeros(0), None
     for snapshots in parts:
         if not len(snapshots):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 
 __all__ = ["LayeredEngine"]
@@ -34,10 +36,12 @@ class LayeredEngine:
         lines that a formation cannot keep."""
         from neurovis_layouts.incremental import kept  # only here: who asks what it can do needs none of it
         from neurovis_layouts.label_sides import sided
-        from neurovis_layouts.layered.hierarchy import drawn
+        from neurovis_layouts.layered.hierarchy import directed, drawn
 
-        fresh = drawn(problem, self.name)
-        return sided(problem, kept(problem, fresh) if problem.memory else fresh)
+        chosen = directed(problem)
+        fresh = drawn(chosen, self.name)
+        found = sided(chosen, kept(chosen, fresh) if chosen.memory else fresh)
+        return found if chosen is problem else replace(found, direction=chosen.direction)
 
     def check(self, problem: LayoutProblem) -> None:
         """Raises the LayoutRefusalError that ``lay_out`` would."""

@@ -81,7 +81,12 @@ def may_be_folded(problem: LayoutProblem) -> bool:
     groups only a page that is asked for is worth that signals run back."""
     fixed = problem.plan or problem.pins or any(module.pins for module in problem.modules)
     asked = problem.modules or problem.aspect is not None or grouped(problem)
-    return bool(asked) and not fixed and len(problem.neurons) + len(problem.edges) <= _MOST
+    return bool(asked) and not fixed and not too_large(problem)
+
+
+def too_large(problem: LayoutProblem) -> bool:
+    """Whether to draw it several times would take too long."""
+    return len(problem.neurons) + len(problem.edges) > _MOST
 
 
 def grouped(problem: LayoutProblem) -> bool:

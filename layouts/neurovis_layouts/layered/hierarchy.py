@@ -14,11 +14,22 @@ from typing import TypeAlias
 
 from neurovis_layouts.alike import mirror_images, shifted_by
 from neurovis_layouts.frame import from_picture
-from neurovis_layouts.layered.compact import NONE, RANKS, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
+from neurovis_layouts.layered.compact import (
+    NONE,
+    RANKS,
+    WHOLE,
+    Fold,
+    Shape,
+    ShapeKey,
+    compact,
+    may_be_folded,
+    too_large,
+)
 from neurovis_layouts.layered.drawing import Drawing, Piece, piece_of
 from neurovis_layouts.layered.engine import stands
 from neurovis_layouts.layered.frame_layout import Frame
 from neurovis_layouts.layered.frame_routing import Standing
+from neurovis_layouts.layered.page_cost import PageCost
 from neurovis_layouts.layered.page_plan import in_direction, parts_by_cell
 from neurovis_layouts.layered.parts import Part, columns_of, holds_instance, may_be_frame, parts_of
 from neurovis_layouts.layered.templates import Book, restricted
@@ -26,6 +37,9 @@ from neurovis_layouts.layered.units import arranged_on_axis
 from neurovis_layouts.pins import with_origins
 from neurovis_spec.layout.labels import BOX_WEIGHT, title_room
 from neurovis_spec.layout.model import Direction, Layout, LayoutMirror, LayoutProblem, Point
+
+#: A page on which a network costs less than this of what it costs from top to bottom has it from left to right.
+_TURNED = 0.85
 
 #: A part, the direction in which it is drawn, and whether with routes.
 _Known: TypeAlias = tuple[Part, Direction, bool]
@@ -36,6 +50,15 @@ def drawn(problem: LayoutProblem, engine: str) -> Layout:
     if not problem.neurons:
         return Layout(problem.network, engine, {}, {})
     return Composer(_framed(problem)).whole().layout(problem, engine)
+
+
+def directed(problem: LayoutProblem) -> LayoutProblem:
+    """The problem in the direction in which it costs less of the page, where the page may choose."""
+    if not problem.turns or not problem.neurons or too_large(problem):
+        return problem
+    turned = replace(problem, direction="right")
+    down, right = (Composer(_framed(one)).cost() for one in (problem, turned))
+    return turned if right < _TURNED * down else problem
 
 
 def checked(problem: LayoutProblem) -> None:
@@ -86,12 +109,23 @@ class Composer:
     def whole(self, routed: bool = True) -> Drawing:
         """The drawing of the problem; without ``routed`` that of its neurons and frames alone, which stand where they
         do with it. Raises LayoutRefusalError for what cannot be met."""
+        return self.compose(self._shaped(), routed)
+
+    def cost(self) -> float:
+        """What the problem costs of the page in the shape in which it costs least."""
+        problem = self._shaped()
+        drawing = self._in_shape(problem, replace(self._shape, draft=True))
+        cost = PageCost(problem, [(edge.source, edge.target) for edge in problem.edges], directed=True)
+        return cost(drawing.places, drawing.rect())
+
+    def _shaped(self) -> LayoutProblem:
+        """The whole, of which it is known then in which shape it is drawn."""
         problem = self._book.whole()
         problem = replace(problem, pins=self._with_origins(problem))
         self._folding = may_be_folded(problem)
         if self._folding:
             self._shape = compact(problem, self._in_shape, self._folds)
-        return self.compose(problem, routed)
+        return problem
 
     def _in_shape(self, problem: LayoutProblem, shape: Shape) -> Drawing:
         """The drawing of the whole in a shape; the same shape is tried in several orders of folds."""

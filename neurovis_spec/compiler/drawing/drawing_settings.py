@@ -15,6 +15,11 @@ import numpy as np
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.language.words import TOP, Direction, Viewpoint
 
+#: How many pixels a side of a picture has.
+LEAST_SIDE, MOST_SIDE = 64, 16384
+#: The most pixels of a picture: 8K is a little less. Its bytes take some 250 MB of memory.
+MOST_PIXELS = 1 << 25
+
 
 @dataclass(frozen=True, slots=True)
 class Mirror:
@@ -63,6 +68,8 @@ class LayoutSettings:
 
     engine: str = "auto"
     direction: Direction = "down"
+    #: whether the author says so
+    directed: bool = False
     positions: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     #: neuron indices → row, column, grid, ring, arc
     arrange: tuple[tuple[tuple[int, ...], str], ...] = ()

@@ -15,6 +15,9 @@ from typing import Literal, NamedTuple
 from neurovis_spec import plugins
 from neurovis_spec.compiler.connections.connect import Connected
 from neurovis_spec.compiler.drawing.drawing_settings import (
+    LEAST_SIDE,
+    MOST_PIXELS,
+    MOST_SIDE,
     Cell,
     LayoutSettings,
     Mirror,
@@ -43,8 +46,6 @@ from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.likeness import suggest
 from neurovis_spec.themes import COLOURS
 
-#: The most pixels of a picture: 8K is a little less. Its bytes take some 250 MB of memory.
-_MOST_PIXELS = 1 << 25
 #: The section where a spec has none.
 _EMPTY_LAYOUT = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), context=Findings())
 GainKind = Literal["activity", "signal", "thickness", "change"]
@@ -80,6 +81,7 @@ def layout_settings(
     return LayoutSettings(
         engine=engine,
         direction=direction,
+        directed=model.direction is not None,
         positions=pins.places,
         arrange=tuple(arrange),
         boxes=tuple(boxes),
@@ -214,8 +216,8 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
     if model.size is not None:
         width, height = (_side(side, constants) for side in model.size[:2])
         size = None if width is UNKNOWN or height is UNKNOWN else (width, height)
-        if size is not None and size[0] * size[1] > _MOST_PIXELS:
-            message = f"a picture has at most {_MOST_PIXELS:,} pixels, this one {size[0] * size[1]:,}"
+        if size is not None and size[0] * size[1] > MOST_PIXELS:
+            message = f"a picture has at most {MOST_PIXELS:,} pixels, this one {size[0] * size[1]:,}"
             hint = "an '.svg' can be shown as large as one likes"
             constants.findings.error("out-of-range", model.size[1].span, message, hint)
     least = None if model.min_weight is None else known(constants.scalar(model.min_weight), None)
@@ -327,8 +329,8 @@ def _side(formula: Formula, constants: Constants) -> int | Unknown:
         message = f"a side of a picture must be an integer, this is {value:g}"
         constants.findings.error("not-an-integer", formula.span, message)
         return UNKNOWN
-    if not 64 <= value <= 16384:
-        message = f"a side of a picture has 64 to 16384 pixels, this is {value:.15g}"
+    if not LEAST_SIDE <= value <= MOST_SIDE:
+        message = f"a side of a picture has {LEAST_SIDE} to {MOST_SIDE} pixels, this is {value:.15g}"
         constants.findings.error("out-of-range", formula.span, message)
         return UNKNOWN
     return int(value)
