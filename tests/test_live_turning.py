@@ -31,7 +31,8 @@ EVENTS = "document.querySelector('#events').value"
 
 def test_what_is_declared_has_its_bounds_and_description() -> None:
     head = "neurovis: 1\nname: x\n"
-    given = "parameters: {a: {value: 2, max: 3, unit: mV, description: the gain}, c: 3}\nneurons: {A: {count: c, bias: a}}\n"
+    given = "parameters: {a: {value: 2, max: 3, unit: mV, description: the gain}, c: 3}\n"
+    given += "neurons: {A: {count: c, bias: a}}\n"
     assert declared(nv.compile_text(head + given))["parameters"] == [
         {"name": "a", "value": 2.0, "low": None, "high": 3.0, "description": "the gain", "unit": "mV"}
     ]
