@@ -24,10 +24,11 @@ from neurovis_spec.live.commands import REQUESTS
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.protocol import findings_message, refused_message
+from neurovis_spec.live.retitled import retitled
 from neurovis_spec.live.run import Change, Run, Stage
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show
-from neurovis_spec.live.watch import Watch
+from neurovis_spec.live.watch import Marks, Watch, marks
 from neurovis_spec.runtime.errors import RecordingError
 
 #: Tells everybody, and those who come later.
@@ -69,25 +70,39 @@ class Edits:
     def __init__(self, show: Show, edited: Edited, run: Run, tell: Tell, desk: Desk) -> None:
         self._show, self._spec, self._run, self._tell, self._desk = show, edited, run, tell, desk
         self._watched = edited.files(desk.placed.compiled)
+        #: the files beside the spec, as they were when what is shown was compiled
+        self._beside: Marks | None = self._now()
 
     def watch(self) -> Watch:
         """What watches the files."""
         return Watch(self._watched, self._edited)
 
+    def _now(self) -> Marks:
+        return marks(self._watched - {self._spec.path})
+
     def _edited(self) -> Iterable[Path]:
+        before, now = self._desk.placed.compiled, self._now()
         try:
-            compiled = self._spec.compile()
+            again = retitled(before, self._spec.path) if now == self._beside else None
+            compiled = again or self._spec.compile()
             layout = self._desk.renew(compiled)
         except Exception as error:  # a layout engine, ours or anybody's, may fail
             return self._refused(_words(error))
         try:
-            refused = self._changed(self._show.changed(compiled, self._run.appearance, layout))
+            view = self._run.view
+            if again is not None and layout is view.layout:
+                change = self._show.retitled(again, view)
+            else:
+                change = self._show.changed(compiled, self._run.appearance, layout)
+            refused = self._changed(change)
         except Exception as error:  # so may a body
             refused = _words(error)
         if refused is not None:
             self._desk.unrenew()
             return self._refused(refused)
-        self._watched = self._spec.files(compiled)
+        self._watched, self._beside = self._spec.files(compiled), now
+        if self._now().keys() != now.keys():
+            self._beside = None  # files that nobody has looked at before
         self._tell(findings_message(show_text(compiled.warnings, compiled.sources), errors=False))
         return self._watched
 

@@ -57,6 +57,8 @@ class Placed:
 
     def carried(self, compiled: Compilation) -> Placed:
         """The same in an edited network: what is there still stays where it was put. Raises LayoutRefusalError."""
+        if compiled.problem is self.compiled.problem:
+            return replace(self, compiled=compiled)
         begun = placed(compiled, self.engine)
         moved = tuple(name for name in self.moved if name in compiled.network.neuron_index)
         if not moved:

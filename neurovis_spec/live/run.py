@@ -154,6 +154,11 @@ class Run:
         """Begin."""
         self._thread.start()
 
+    @property
+    def view(self) -> View:
+        """How what is shown is drawn."""
+        return self._view
+
     def ask(self, command: Command, refuse: Refuse = _ignore, done: Done = _nothing) -> None:
         """Have a command carried out between two steps; ``done`` is called after that, or ``refuse``."""
         self._asked.put((command, refuse, done))

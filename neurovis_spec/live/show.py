@@ -70,16 +70,32 @@ class Show:
 
         return same_step
 
+    def retitled(self, compiled: Compilation, before: View) -> Change:
+        """What shows a network of which nothing but the title was edited: the run goes on as it is."""
+        view = self.view(compiled, before.appearance, before.layout, before)
+
+        def same_run(old: Source) -> Stage:
+            return old, view
+
+        return same_run
+
     def _source(self, compiled: Compilation) -> Source:
         if self.recording is not None:
             return RecordedSource(compiled.network, self.recording)
         return SimulatedSource(self.begin.simulation(compiled.network, self.backend))
 
-    def view(self, compiled: Compilation, appearance: Appearance = AS_IT_IS, layout: Layout | None = None) -> View:
-        """How a network is drawn, by default in its own layout. Raises LayoutRefusalError."""
+    def view(
+        self,
+        compiled: Compilation,
+        appearance: Appearance = AS_IT_IS,
+        layout: Layout | None = None,
+        before: View | None = None,
+    ) -> View:
+        """How a network is drawn, by default in its own layout; ``before`` is how it was with another title. Raises
+        LayoutRefusalError."""
         shown = compiled
         if appearance.pathways:
             network = compiled.network
             shown = replace(compiled, network=replace(network, render=replace(network.render, pathways=True)))
         gains, otherwise = shown.gains_for(self.recording), partial(self.view, compiled, layout=layout)
-        return view_of(compiled, gains, self.theme, self.engine, appearance, layout, otherwise)
+        return view_of(compiled, gains, self.theme, self.engine, appearance, layout, otherwise, before)

@@ -38,7 +38,7 @@ from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gathered_layout import laid_out
 from neurovis_spec.scene.matrix import order_of
 from neurovis_spec.scene.pathway_words import told
-from neurovis_spec.scene.plan import Plan, plan
+from neurovis_spec.scene.plan import Plan, plan, retitled
 from neurovis_spec.themes import THEMES
 
 #: A colour value of 1 as a number: between neighbours lie less than 1.2 of 255 levels of a colour.
@@ -225,17 +225,20 @@ def view_of(
     appearance: Appearance = AS_IT_IS,
     layout: Layout | None = None,
     otherwise: Callable[[Appearance], View] | None = None,
+    before: View | None = None,
 ) -> View:
     """How a compiled network is drawn, by default in the layout of an engine. ``gains`` are of what its ``appearance``
-    shows, each neuron or each group; ``otherwise`` draws it in another one, by default with the same gains. Raises
-    LayoutRefusalError, RendererError."""
+    shows, each neuron or each group; ``otherwise`` draws it in another one, by default with the same gains; ``before``
+    is how it was drawn with these gains and another title. Raises LayoutRefusalError, RendererError."""
     layout = compiled.placed(engine) if layout is None else layout
     network = in_direction(compiled.network, layout)
     settings = replace(compiled.settings_for(appearance.theme or theme), pathways=appearance.pathways)
     drawn = gathered(network, settings.collapse, settings.pathways)
     seen = appearance.gains(gains)
     stands = laid_out(drawn, layout)
-    planned = plan(drawn, stands, seen, settings)
+    same = before is not None and before.layout is stands and before.appearance == appearance
+    planned = retitled(before.plan, drawn, stands, seen, settings) if before is not None and same else None
+    planned = planned or plan(drawn, stands, seen, settings)
     largest = np.ones(len(seen.thickness))
     for scale in seen.thickness_scales:
         largest[seen.on_thickness(scale)] = scale.shown(scale.reaches or 1.0)

@@ -8,7 +8,7 @@ arranged in page units; the Plan is in user units (``frame``).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,6 +80,8 @@ _FAR = 0.55
 _UNFOCUSED = 0.4
 #: a picture is made so wide at most to have its legend in one row, and its title in one line
 _ROOM = 840.0
+#: the id of the title's group
+_TITLED = "title"
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +123,7 @@ class Plan:
     #: who is in each box, and what is left out of which pathway and stands as a bundle, by the ids of their groups
     boxes: Mapping[str, tuple[int, ...]]
     left: Mapping[str, Pathway]
+    framed: _Framed = field(repr=False)
 
     def theme_ends(self, ends: EndArray) -> EndArray:
         """How lines end in its theme, which may know nothing but arrows."""
@@ -148,11 +151,8 @@ def plan(
     picture is at least ``narrowest`` wide (page units). Raises KeyError for a theme that does not exist, RendererError
     for a path that is none."""
     theme = theme_of(settings)
-    weights = np.abs(drawn.network.connections.weights.whole()) if peaks is None else peaks
-    content = _content(drawn, layout, settings, weights, begin)
+    content, framed = _begun(drawn, layout, gains, settings, peaks, narrowest, begin)
     network, seen = content.network, content.seen
-    widths = encoding.clamped(gains.widths(weights)[seen.lines])
-    framed = _framed(_Wanted(content, gains, settings, theme, narrowest), widths)
     frame, gains = framed.frame, in_pages(gains, framed.unit)
     page = _on_page(content, framed, gains, layout, theme)
     said = _texts(content, page, settings)
@@ -183,8 +183,46 @@ def plan(
         notes=content.notes,
         boxes={f"{box.kind}:{box.path}": box.members for box in page.boxes},
         left={bundles.id_of(one.pathway, network): one.pathway for one in page.bundles.all},
+        framed=framed,
     )
     return made if framed.unit == 1 else _in_user_units(made, framed.unit)
+
+
+def retitled(planned: Plan, drawn: Gathered, layout: Layout, gains: Gains, settings: RenderSettings) -> Plan | None:
+    """The plan of a network of which nothing but the title has changed, all else being as it was when it was
+    ``planned``; None where more has, or where this title has other room than that one had, so that the rest would stand
+    elsewhere."""
+    network, before = drawn.network, planned.network
+    kept = (getattr(network, one.name) is getattr(before, one.name) for one in fields(network) if one.name != "title")
+    if not all(kept):
+        return None
+    content, framed = _begun(drawn, layout, gains, settings)
+    room, roomed = ((one.picture(len(content.notes)), one.title is None) for one in (framed, planned.framed))
+    if room != roomed or replace(framed, title=None) != replace(planned.framed, title=None):
+        return None
+    unit, title = planned.unit, framed.titled(theme_of(settings))
+    front = [group for group in planned.front if group.id != _TITLED]
+    place = next((place for place, group in enumerate(planned.front) if group.id == _TITLED), len(front))
+    front[place:place] = [group if unit == 1 else scaled_group(group, unit) for group in title]
+    captioned = None if framed.title is None else lowered(framed.title, framed.frame.width)
+    words = network.title or network.name
+    return replace(planned, network=network, title=words, front=tuple(front), captioned=captioned, framed=framed)
+
+
+def _begun(
+    drawn: Gathered,
+    layout: Layout,
+    gains: Gains,
+    settings: RenderSettings,
+    peaks: FloatArray | None = None,
+    narrowest: float = 0.0,
+    begin: Snapshot | None = None,
+) -> tuple[_Content, _Framed]:
+    """What is in a picture, and its frame."""
+    weights = np.abs(drawn.network.connections.weights.whole()) if peaks is None else peaks
+    content = _content(drawn, layout, settings, weights, begin)
+    widths = encoding.clamped(gains.widths(weights)[content.seen.lines])
+    return content, _framed(_Wanted(content, gains, settings, theme_of(settings), narrowest), widths)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -548,10 +586,14 @@ class _Framed:
         top = _top(self.title, self.frame.width, notes) or 4.0
         return 6.0, top, self.frame.width - 6.0, self.bottom - (8.0 if self.items else 0.0)
 
+    def titled(self, theme: Theme) -> Iterator[Group]:
+        """The title, where there is one."""
+        if self.title is not None:
+            yield Group(title_lines(self.title, self.frame.width, theme), id=_TITLED)
+
     def around(self, notes: Sequence[str], theme: Theme) -> Iterator[Group]:
         """Title, notes and legend."""
-        if self.title is not None:
-            yield Group(title_lines(self.title, self.frame.width, theme), id="title")
+        yield from self.titled(theme)
         if notes:
             yield _noted(notes, self.title, self.frame, theme)
         if self.items:
