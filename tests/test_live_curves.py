@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.live.curves import Curve
+from neurovis_spec.live.curves import Curve, series_of
 from neurovis_spec.live.history import Bins
 from neurovis_spec.live.protocol import LookAt, command_of
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.view import View, view_of
+from neurovis_spec.live.view import KIND, KINDS, View, view_of
 
 HEAD = "neurovis: 1\nname: x\ninputs: {goal: {expression: 'sin(k/5)'}}\n"
 ONE = f"""{HEAD}neurons: {{A: {{activation: tanh, bias: 0.4}}, O: {{role: output}}, T: {{input: goal}}}}
@@ -54,10 +54,11 @@ def test_an_error_is_read_as_what_is_wanted_less_what_is_there(text: str, record
         source.advance()
     error = view.members("e0")
     assert error is not None
+    source.history.follow({name: one for name, (_, one) in series_of(compiled.network).items()})
     read = source.history.read(error, Bins(0, 1, 30))
     assert np.allclose(read, expected[:, None], rtol=1e-5, atol=1e-7)
     assert view.values(source.seen(), ["e0"]) == {"e0": pytest.approx(expected[-1], rel=1e-12)}
-    assert view.place("e0") == (len(compiled.network.connections) + len(compiled.network.neurons), 0)
+    assert view.place("e0") == (KINDS.index("e") << KIND, 0)
 
 
 def test_of_several_it_is_the_root_mean_square_and_there_are_no_more_than_three() -> None:

@@ -298,7 +298,7 @@ def test_the_page_knows_the_names_of_what_is_drawn_and_glyphs_have_those_of_thei
     view, source = view_of(glyphs, glyphs.gains), SimulatedSource(glyphs.simulator())
     source.advance()
     assert source.quantities is not None
-    values = dict(zip(view.quantities.names, source.quantities.tolist(), strict=True))
+    values = dict(zip(view.quantities.names, source.quantities.tolist(), strict=False))
     told = view.values(source.seen(), ["n0.v", "c0.signal", "c0.g", "c2.trace"], source.quantities)
     assert told["n0.v"] == (values["A1.v"] + values["A2.v"]) / 2
     assert told["c0.g"] == (values["(A1 -> B).g"] + values["(A2 -> B).g"]) / 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from pathlib import Path
 
 import numpy as np
@@ -417,5 +418,52 @@ neurons: {K: {model: cell, bias: 1.5}}
             assert (await numbers(opened, above))[0] > 3
             await opened.ask("(s => { s.value = 'spike'; s.onchange(); return 1 })(document.querySelector('.what'))")
             await opened.until(f"{TRACE.format(0)}?.startsWith('K, spike')")
+
+    asyncio.run(main())
+
+
+def test_a_curve_is_added_by_typing_it_and_those_who_look_on_see_it(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, access):
+            await opened.until(f"{STEP} > 60")
+            step = await pause(opened)
+            await opened.key("c")
+            typing = (
+                "document.querySelector('#measure').value = {0}; document.querySelector('#measuring').requestSubmit()"
+            )
+            said = "document.querySelector('#mismeasured').textContent"
+            await opened.ask(typing.format("'mean(hiden)'"))
+            await opened.until(f"{said}.includes(\"no neuron, output or parameter 'hiden'\")")
+            field = "document.querySelector('#measure')"
+            assert await opened.ask(f"{field}.value.slice({field}.selectionStart, {field}.selectionEnd)") == "hiden"
+            await opened.ask(f"{field}.value = 'rms(T - '; {field}.dispatchEvent(new Event('input'))")
+            offered = str(
+                await opened.ask("[...document.querySelector('#measurable').options].map((o) => o.value).join()")
+            )
+            assert {"rms(T - O", "rms(T - K3", "rms(T - eta"} <= set(offered.split(","))
+            assert not await opened.ask("document.querySelector('#mismeasured').classList.contains('wrong')")
+            await opened.ask(typing.format("'rms(T - O, last=20)'"))
+            await opened.until(f"{TRACE.format(0)}?.startsWith('rms(T - O, last=20) from step 0 to {step}')")
+            run = compiled.run(step + 1)
+            values = compiled.measure("rms(T - O, last=20)", run)
+            ends = [float(number) for number in re.findall(r"\+([\d.]+)", str(await opened.ask(TRACE.format(0))))]
+            assert ends == pytest.approx([np.nanmin(values), np.nanmax(values)], rel=1e-4)
+            now = "Number(document.querySelectorAll('.now')[0].textContent.replace('−', '-'))"
+            await opened.until(f"Math.abs({now} - {values[step]}) < 1e-5")
+            assert await opened.ask(f"{field}.value") == ""
+            await opened.ask(typing.format("'K3 -> O'"))
+            await opened.until(f"{TITLE.format(1)} == 'K3 → O'")
+            await opened.ask("document.querySelectorAll('.pin')[1].click()")
+            await opened.key("Escape")
+            await opened.call("Page.navigate", url=access.url(owner=False))
+            await opened.until(
+                f"[0, 1, 2].some((at) => {TRACE.replace('{0}', 'at')}?.startsWith('rms(T - O, last=20) from'))"
+            )
+            await opened.ask(typing.format("'mean(K)'"))
+            await opened.until("document.querySelector('#refusal').textContent.includes('only looks on')")
+            await opened.call("Page.navigate", url=access.url())
+            await opened.until(f"{TITLE.format(2)}?.startsWith('rms')")
+            await opened.ask("document.querySelectorAll('.pin')[2].click()")
+            await opened.until(f"{TITLE.format(2)} == ''")
 
     asyncio.run(main())

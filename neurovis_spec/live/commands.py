@@ -109,6 +109,20 @@ class Speed:
 
 
 @dataclass(frozen=True, slots=True)
+class Measure:
+    """A measure of the language is a curve from now on, for all who look on."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Unmeasure:
+    """The measure of a number is none any more."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
 class Present:
     """Show the current step once more, for a client that has just connected."""
 
@@ -120,7 +134,9 @@ class Draw:
     appearance: Appearance
 
 
-Command: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Restart | Branch | Switch | Speed | Turn
+Command: TypeAlias = (
+    Present | Draw | Play | Pause | Step | Seek | Event | Restart | Branch | Switch | Speed | Measure | Unmeasure | Turn
+)
 
 
 #: Where what was put by hand is written: into ``layout.positions`` of the spec, or into the layout file that the spec

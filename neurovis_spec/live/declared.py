@@ -34,6 +34,12 @@ def declared(compiled: Compilation) -> dict[str, list[dict[str, object]]]:
     }
 
 
+def words_of(network: Network) -> list[str]:
+    """The names that a measure can have beside those of neurons, connections, sensors and parameters."""
+    groups = (group.name for group in network.neurons.groups if len(group.indices) > 1)
+    return [*dict.fromkeys((*groups, *(output.name for output in network.outputs)))]
+
+
 def _about(name: str, written: Mapping[str, InputModel], sensed: Mapping[str, str]) -> str:
     """The description of an input, and which sensors it is."""
     own = written[name].description if name in written else None

@@ -1,8 +1,8 @@
 """The history: what neurons did and what connections weighed, step by step, in bounded memory, for traces.
 
-In: the activities, weights and quantities (``runtime/quantities.py``) of each step. Out: of any of them the least and
-the largest value in each of some bins of steps. One thread notes, others read without waiting: what is read while it
-changes may be wrong for one picture.
+In: the activities, weights and quantities (``runtime/quantities.py``, ``beside.py``) of each step. Out: of any of them,
+and of the series that are followed, the least and the largest value in each of some bins of steps. One thread notes,
+others read without waiting: what is read while it changes may be wrong for one picture.
 """
 
 from __future__ import annotations
@@ -10,12 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
+from functools import partial
+from threading import Lock
 from typing import Final, Literal, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.live.followed import APART, Followed
+from neurovis_spec.live.series import Series, Steps
 from neurovis_spec.runtime.recording import Recording
 
 #: bytes
@@ -27,6 +31,9 @@ _READ: Final = 1 << 20
 
 Range: TypeAlias = npt.NDArray[np.float32]
 Of: TypeAlias = Literal["neurons", "connections", "quantities"]
+_NONE: Final = np.zeros(0, np.int64)
+#: Series are worked out after so many steps at the latest, that none of these is forgotten before.
+_LATEST: Final = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +49,18 @@ class Bins:
 class Members:
     """What a trace is of, by indices: activities of neurons, or the states that they show; weights of connections; or
     quantities; each ``less`` another, where there are such. Several are joined to their mean, their sum, as weights and
-    signals are, or their root mean square."""
+    signals are, or their root mean square. Or it is of a ``series`` that is followed."""
 
     of: Of
     indices: IntArray
     joined: Literal["mean", "sum", "rms"] = "mean"
     less: IntArray | None = None
+    series: str = ""
+
+    @classmethod
+    def of_series(cls, name: str) -> Members:
+        """Those of a series."""
+        return cls("quantities", _NONE, series=name)
 
     @property
     def read(self) -> IntArray:
@@ -75,6 +88,11 @@ class History(Protocol):
         """The least and the largest value in each bin (bins, 2); NaN where nothing is known."""
         ...
 
+    def follow(self, series: Mapping[str, Series]) -> None:
+        """Work out these series up to the last step that is known, by their names, and no others; to be called by the
+        thread of the run. Raises SpecError, BodyError, RecordingError for what a recording cannot tell."""
+        ...
+
 
 def _ranges(steps: IntArray, values: FloatArray | Range, bins: Bins) -> Range:
     """The least and the largest of the values at ascending steps in each bin."""
@@ -94,6 +112,16 @@ def _thinned(rows: IntArray, members: Members) -> IntArray:
     return rows[:: max(1, -(-len(rows) * len(members.read) // _READ))]
 
 
+def _unknown(bins: Bins) -> Range:
+    """Nothing is known."""
+    return np.full((bins.count, 2), np.nan, np.float32)
+
+
+def _of_series(followed: Followed, bins: Bins) -> Range:
+    """The least and the largest number of a series in each bin."""
+    return _ranges(*followed.between(bins.first, bins.first + bins.every * bins.count - 1), bins)
+
+
 class Ring:
     """The latest steps of a run of n neurons and m connections, with k quantities, where it is known what they are;
     where ``room`` (bytes) is full the oldest go."""
@@ -104,6 +132,8 @@ class Ring:
         self._size = max(2 * _NEXT, min(_STEPS, room // (4 * max(1, width))))
         self._values = np.empty((self._size, width), np.float32)
         self._first, self._last = 0, -1
+        self._followed: dict[str, Followed] = {}
+        self._following = Lock()
 
     @property
     def steps(self) -> tuple[int, int]:
@@ -125,16 +155,46 @@ class Ring:
             row[:n], row[n:known] = activity, weights
             row[known:] = np.nan if quantities is None else quantities
         self._last = step
+        if self._followed and step % min(_LATEST, self._size // 4) == 0:
+            self._work_out()
+
+    def follow(self, series: Mapping[str, Series]) -> None:
+        """Work out these series up to the last step, and no others."""
+        before = self._followed
+        if before.keys() != series.keys() or any(before[name].series is not one for name, one in series.items()):
+            apart = max(1, min(APART, self._size // 4))
+            kept = {name: one for name, one in before.items() if series.get(name) is one.series}
+            self._followed = {name: kept.get(name) or Followed(one, apart) for name, one in series.items()}
+        self._work_out()
+
+    def _work_out(self) -> None:
+        """Work out all series up to the last step."""
+        if self._last < self._first or not self._following.acquire(blocking=False):
+            return  # another thread does
+        try:
+            for one in self._followed.values():
+                one.work_out(self._first, self._last, partial(self._known, one.series.reads))
+        finally:
+            self._following.release()
+
+    def _known(self, reads: IntArray, first: int, last: int) -> Steps:
+        """What is known of the steps from one to another, of quantities those that are read."""
+        steps = np.arange(first, last + 1)
+        rows, columns = steps % self._size, reads + self._starts["quantities"]
+        quantities, there = np.full((len(rows), len(columns)), np.nan), columns < self._values.shape[1]
+        quantities[:, there] = self._values[rows[:, None], columns[there]]
+        return Steps(steps, self._values[rows, : self._starts["connections"]].astype(np.float64), quantities)
 
     @property
     def size(self) -> int:
         """The bytes that it takes."""
-        return int(self._values.nbytes)
+        return int(self._values.nbytes) + sum(one.size for one in self._followed.values())
 
     def copy(self) -> Ring:
         """The same, which goes on by itself."""
         made = copy(self)
-        made._values = self._values.copy()
+        made._values, made._following = self._values.copy(), Lock()
+        made._followed = {name: one.copy() for name, one in self._followed.items()}
         return made
 
     def after(self, step: int) -> Ring:
@@ -144,6 +204,8 @@ class Ring:
         made._size, made._first = max(1, len(steps)), first
         made._values = np.empty((made._size, self._values.shape[1]), np.float32)
         made._values[steps % made._size] = self._values[steps % self._size]
+        self._work_out()
+        made._followed, made._following = {name: one.after(step) for name, one in self._followed.items()}, Lock()
         return made
 
     def go_on(self, later: Ring) -> None:
@@ -157,20 +219,28 @@ class Ring:
         self._values[steps % self._size] = later._values[steps % later._size]
         self._last = int(steps[-1])
         self._first = max(self._first, self._last + 1 + _NEXT - self._size)
+        for name, one in later._followed.items():
+            if name in self._followed and self._followed[name].series is one.series:
+                self._followed[name].go_on(one)
 
     def cut(self, step: int) -> None:
         """Forget what came after a step."""
         self._last = min(self._last, step)
         self._first = min(self._first, self._last + 1)
+        for one in self._followed.values():
+            one.cut(step)
 
     def read(self, members: Members, bins: Bins) -> Range:
         """The least and the largest value in each bin."""
+        if members.series:
+            followed = self._followed.get(members.series)
+            return _unknown(bins) if followed is None else _of_series(followed, bins)
         first, last = self._first, self._last
         end = min(last, bins.first + bins.every * bins.count - 1)
         steps = _thinned(np.arange(max(first, bins.first), end + 1), members)
         columns = members.read + self._starts[members.of]
         if len(columns) and columns.max() >= self._values.shape[1]:
-            return np.full((bins.count, 2), np.nan, np.float32)
+            return _unknown(bins)
         if len(columns) > 1 or not len(steps):
             values = self._values[(steps % self._size)[:, None], columns]
         else:  # of one member all steps are read, of which the later may stand before the earlier
@@ -183,7 +253,8 @@ class Ring:
 class Recorded:
     """The steps of a recording, which holds all activities and weights; ``told`` (rows, n) is what traces of neurons
     show, by default the activities; ``columns`` (k,) are those of the quantities, −1 of one that it does not hold;
-    ``spiking`` (k,) says whose spike one is, −1 of what is none: these it has as events."""
+    ``spiking`` (k,) says whose spike one is, −1 of what is none: these it has as events; ``sensors`` (k,) are the
+    columns of those that are what a sensor has measured."""
 
     def __init__(
         self,
@@ -191,31 +262,57 @@ class Recorded:
         told: FloatArray | None = None,
         columns: IntArray | None = None,
         spiking: IntArray | None = None,
+        sensors: IntArray | None = None,
     ) -> None:
         self._recording, self._told = recording, recording.activity if told is None else told
         self._quantities = np.zeros(0, np.int64) if columns is None else columns
-        self._spiking = np.full(len(self._quantities), -1, np.int64) if spiking is None else spiking
+        none = np.full(len(self._quantities), -1, np.int64)
+        self._spiking, self._sensors = (none if given is None else given for given in (spiking, sensors))
         self._column = np.full(len(recording.sources), -1, np.int64)
         self._column[recording.plastic] = np.arange(len(recording.plastic))
         self._fixed = np.zeros(len(recording.sources))
         self._fixed[np.delete(np.arange(len(recording.sources)), recording.plastic)] = recording.weights_static
+        self._followed: dict[str, tuple[Series, FloatArray]] = {}
+
+    def follow(self, series: Mapping[str, Series]) -> None:
+        """Work out these series, and no others. Raises SpecError, BodyError, RecordingError."""
+        before, found = self._followed, dict[str, tuple[Series, FloatArray]]()
+        rows = np.arange(len(self._recording))
+        for name, one in series.items():
+            if name in before and before[name][0] is one:
+                found[name] = before[name]
+            else:
+                steps = Steps(self._recording.step, self._told, self._values(rows, one.reads))
+                found[name] = one, one.recorded(self._recording, steps)
+        self._followed = found
 
     def read(self, members: Members, bins: Bins) -> Range:
         """The least and the largest value in each bin."""
         steps = self._recording.step
         ends = np.searchsorted(steps, [bins.first, bins.first + bins.every * bins.count])
+        if members.series:
+            _, numbers = self._followed.get(members.series, (None, np.full(len(steps), np.nan)))
+            return _ranges(steps[slice(*ends)], numbers[slice(*ends)], bins)
         rows = _thinned(np.arange(*ends), members)
         if members.of == "neurons":
             values = self._told[rows[:, None], members.read]
         elif members.of == "quantities":
-            columns = self._quantities[members.indices]
-            values = np.full((len(rows), len(columns)), np.nan)
-            values[:, columns >= 0] = self._recording.states[rows[:, None], columns[columns >= 0]]
-            self._put_spikes(values, steps[rows], self._spiking[members.indices])
+            values = self._values(rows, members.indices)
         else:
             column, values = self._column[members.indices], np.tile(self._fixed[members.indices], (len(rows), 1))
             values[:, column >= 0] = self._recording.weights[rows[:, None], column[column >= 0]]
         return _ranges(steps[rows], members.join(values), bins)
+
+    def _values(self, rows: IntArray, indices: IntArray) -> FloatArray:
+        """The quantities of these indices, (rows, indices), NaN where they are not known."""
+        recording, values = self._recording, np.full((len(rows), len(indices)), np.nan)
+        for columns, held in ((self._quantities, recording.states), (self._sensors, recording.sensors)):
+            of = columns[indices] if len(columns) else np.full(len(indices), -1)
+            if held is not None and (of >= 0).any():
+                values[:, of >= 0] = held[rows[:, None], of[of >= 0]]
+        if len(self._spiking):
+            self._put_spikes(values, recording.step[rows], self._spiking[indices])
+        return values
 
     def _put_spikes(self, values: FloatArray, steps: IntArray, neurons: IntArray) -> None:
         """Put the spikes of these neurons into the columns of values (rows, columns) where there are some, each into

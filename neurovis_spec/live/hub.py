@@ -10,6 +10,7 @@ desk; what is refused is told.
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -20,7 +21,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.live.commands import Request
+from neurovis_spec.live.commands import Measure, Request
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.held import told_of
 from neurovis_spec.live.history import Bins, History
@@ -35,6 +36,7 @@ from neurovis_spec.live.protocol import (
     command_of,
     frame_message,
     held_message,
+    measured_message,
     raster_message,
     refused_message,
     scene_message,
@@ -44,6 +46,7 @@ from neurovis_spec.live.protocol import (
 )
 from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.source import NOTHING, Drawn
+from neurovis_spec.live.typed import findings
 
 #: Frames that a client may be sent before it has drawn them.
 AHEAD: Final = 2
@@ -115,6 +118,11 @@ class Hub:
 
     def __len__(self) -> int:
         return len(self._clients)
+
+    @property
+    def shown(self) -> Shown | None:
+        """What was shown last."""
+        return self._shown
 
     @property
     def watched(self) -> bool:
@@ -266,8 +274,7 @@ class Hub:
             client.asked = bool(client.items)
         if client.asked:
             client.asked = False
-            values = shown.view.values(shown.seen, client.items, shown.quantities)
-            yield values_message(shown.glance.step, values)
+            yield values_message(shown.glance.step, _values(shown, client.items))
         if client.traces:
             traces, client.traces = client.traces, ()
             yield from traces
@@ -314,6 +321,17 @@ class Hub:
         return found
 
 
+def _values(shown: Shown, items: tuple[str, ...]) -> dict[str, float]:
+    """What a client looks at, series as they are kept."""
+    step, found = shown.glance.step, shown.view.values(shown.seen, items, shown.quantities)
+    for item in items:
+        members = shown.view.members(item) if item not in found else None
+        if members is not None and members.series:
+            value = float(shown.history.read(members, Bins(step, 1, 1))[0, 0])
+            found |= {} if math.isnan(value) else {item: value}
+    return found
+
+
 def _changed(before: Shown, now: Shown) -> npt.NDArray[np.bool_]:
     """Which items (connections, then neurons) look otherwise, but for their colours."""
     one, other = before.glance, now.glance
@@ -334,6 +352,7 @@ class Reception:
             self._hub.drawn(client, acknowledged(message).serial)
             return
         command = command_of(message)
+        shown = self._hub.shown
         if isinstance(command, LookAt):
             self._hub.check(client, command.items)
         elif isinstance(command, Trace):
@@ -342,6 +361,11 @@ class Reception:
             self._hub.hold(client, command.of)
         elif not client.owner:
             client.tell(refused_message("this page only looks on"))
+        elif isinstance(command, Measure) and shown is not None:
+            found = findings(command.text, shown.view.drawn.whole)
+            client.tell(measured_message(command.text, found))
+            if not found:
+                self._run.ask(command, lambda reason: self._hub.refuse(client, reason))
         elif not isinstance(command, Request):
             self._run.ask(command, lambda reason: self._hub.refuse(client, reason))
         elif self._desk is not None:

@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from neurovis_spec.body import text_of
 from neurovis_spec.compiler.drawing.pins import FARTHEST
+from neurovis_spec.diagnostics import Diagnostic
 from neurovis_spec.layout.model import Point
 from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.commands import (
@@ -31,6 +32,7 @@ from neurovis_spec.live.commands import (
     Draw,
     Event,
     Fetch,
+    Measure,
     Pause,
     PlaceNeuron,
     Play,
@@ -41,6 +43,7 @@ from neurovis_spec.live.commands import (
     Speed,
     Step,
     Switch,
+    Unmeasure,
     Unplace,
     Write,
 )
@@ -52,6 +55,7 @@ from neurovis_spec.live.run import Status
 from neurovis_spec.live.saving import MOST_SECONDS
 from neurovis_spec.live.source import Drawn, Reach
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh
+from neurovis_spec.live.typed import LONGEST
 from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
@@ -76,8 +80,8 @@ _MOST = (1 << 53) - 1
 #: The most components of an input, and parameters set at once.
 _MANY = 1024
 #: The most items whose values a client gets, and the id of one: of a neuron or a connection, perhaps with the name of
-#: something that it has; or of an error.
-_WATCHED, _ITEM = 64, re.compile(r"[nce][0-9]{1,9}(\.[A-Za-z_]\w{0,4095})?", re.ASCII)
+#: something that it has; or of an error, an input, a measure, a sensor.
+_WATCHED, _ITEM = 64, re.compile(r"[nceims][0-9]{1,8}(\.[A-Za-z_]\w{0,4095})?", re.ASCII)
 #: The gains of Eqs. 2–5.
 _GAINS = ("activity", "signal", "thickness", "change")
 #: The most items that a client is sent traces of at once, and rasters, the most bins, and steps in each.
@@ -144,6 +148,7 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         appearance=asdict(status.appearance),
         backend=status.backend,
         futures=[_future(one) for one in status.futures],
+        measures=[{"number": number, "text": text} for number, text in status.measures],
     )
 
 
@@ -187,7 +192,7 @@ def values_message(step: int, values: Mapping[str, float]) -> str:
 
 
 def trace_message(version: int, traces: Mapping[tuple[int, int], Range], bins: Bins, kind: int = TRACE) -> bytes:
-    """Traces of items (connections, then neurons), each with what of it that is: 0 its activity or weight, else the
+    """Traces of items (``View.place``), each with what of it that is: 0 its activity or weight, else the
     number of a name in the list that the scene has for it, from 1 on. The least and the largest value of each bin. Of
     the ``kind`` LEFT they are those of the future that was left last."""
     head = _TRACE_HEAD.pack(kind, version, len(traces), bins.first, bins.every, bins.count)
@@ -203,6 +208,15 @@ def raster_message(version: int, item: int, names: Sequence[str], rows: Sequence
     words = "\n".join(names).encode()[: (1 << 16) - 1]
     head = _RASTER_HEAD.pack(RASTER, version, item, bins.first, bins.every, bins.count, len(rows), len(words))
     return head + words + cells.tobytes()
+
+
+def measured_message(text: str, found: Sequence[Diagnostic]) -> str:
+    """Whether a text is a measure: what is wrong with it, from one character to another, nothing where all is well."""
+    told = [
+        {"start": one.span.column - 1, "end": one.span.end_column - 1, "message": one.message, "hint": one.hint or ""}
+        for one in found
+    ]
+    return _text("measured", text=text, findings=told)
 
 
 def findings_message(text: str, errors: bool) -> str:
@@ -335,6 +349,12 @@ def _name(value: object) -> str:
     return value
 
 
+def _measure_text(value: object) -> str:
+    if not isinstance(value, str) or not 0 < len(value.strip()) <= LONGEST:
+        raise ProtocolError(f"a measure of at most {LONGEST} characters is wanted")
+    return value.strip()
+
+
 def _truth(value: object) -> bool:
     if not isinstance(value, bool):
         raise ProtocolError("true or false is wanted")
@@ -446,6 +466,8 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "switch": ({"number": _whole(0, _MOST)}, Switch),
     "draw": ({"theme": _theme, **dict.fromkeys(_GAINS, _factor), "pathways": _truth}, _draw),
     "speed": ({"value": _speed}, Speed),
+    "measure": ({"text": _measure_text}, Measure),
+    "unmeasure": ({"number": _whole(0, _MOST)}, Unmeasure),
     "set": ({"values": _values, "moving": _truth}, Set),
     "feed": ({"name": _name, "values": _numbers, "moving": _truth}, Feed),
     "hold": ({"neurons": _name, "value": _number, "moving": _truth}, Hold),

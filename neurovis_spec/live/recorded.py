@@ -14,6 +14,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SPIKE
+from neurovis_spec.live.beside import Beside
 from neurovis_spec.live.futures import Futures
 from neurovis_spec.live.history import Recorded
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, drawn, recalled
@@ -53,12 +54,17 @@ class RecordedSource:
         self._states = [known[name] for name in names] if names and known.keys() >= set(names) else None
         self._controls, self._state, self._applied = Controls(network), initial_state(network), 0
         told = self._recording.spiking
-        every = Quantities(network).names if known or told is not None else ()
-        self._columns = np.array([known.get(name, -1) for name in every], np.int64)
+        every = Quantities(network)
+        names = every.names if known or told is not None else ()
+        beside, self._sensors = Beside(network, len(every)).columns(self._recording)
+        self._columns = np.concatenate([np.full(len(every), -1, np.int64), beside])
+        self._columns[: len(names)] = [known.get(name, -1) for name in names]
+        self._sensors = np.concatenate([np.full(len(every), -1, np.int64), self._sensors])
         spikes = {f"{network.neurons.names[index]}.{SPIKE}": index for index in ([] if told is None else told.tolist())}
-        self._spiking = np.array([spikes.get(name, -1) for name in every], np.int64)
+        self._spiking = np.full(len(self._columns), -1, np.int64)
+        self._spiking[: len(names)] = [spikes.get(name, -1) for name in names]
         shown = ShownStates(network).recorded(self._recording)
-        self.history = Recorded(self._recording, shown, self._columns, self._spiking)
+        self.history = Recorded(self._recording, shown, self._columns, self._spiking, self._sensors)
 
     @property
     def step(self) -> int:
@@ -97,7 +103,10 @@ class RecordedSource:
         now = recording.spike_neurons[recording.spike_steps == self.step]
         spikes = np.where(self._spiking < 0, np.nan, np.isin(self._spiking, now))
         states = recording.states[self._row]
-        return np.where(self._columns < 0, spikes, states[self._columns] if len(states) else np.nan)
+        found = np.where(self._columns < 0, spikes, states[self._columns] if len(states) else np.nan)
+        if recording.sensors is None:
+            return found
+        return np.where(self._sensors < 0, found, recording.sensors[self._row, self._sensors])
 
     @property
     def backend(self) -> str:

@@ -17,6 +17,9 @@ from threading import Thread
 from typing import Final, ParamSpec, TypeAlias
 
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.body import BodyError
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.live.clock import FRAMES, Clock, Pace
 from neurovis_spec.live.commands import (
     Appearance,
@@ -24,6 +27,7 @@ from neurovis_spec.live.commands import (
     Command,
     Draw,
     Event,
+    Measure,
     Pause,
     Play,
     Present,
@@ -32,12 +36,17 @@ from neurovis_spec.live.commands import (
     Speed,
     Step,
     Switch,
+    Unmeasure,
 )
+from neurovis_spec.live.curves import series_of
 from neurovis_spec.live.futures import Future
 from neurovis_spec.live.history import History
+from neurovis_spec.live.series import Series
 from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, Source, SourceError
 from neurovis_spec.live.turns import Turned
+from neurovis_spec.live.typed import Typed
 from neurovis_spec.live.view import Glance, View
+from neurovis_spec.runtime.errors import RecordingError
 
 _LOG: Final = logging.getLogger(__name__)
 P = ParamSpec("P")
@@ -47,7 +56,8 @@ P = ParamSpec("P")
 class Status:
     """What a client is told of a run when it changes: ``ended`` where there is no further step; ``events``, the steps
     at which the spec has some; ``backend``, what makes the steps, "" where that is not known;
-    ``futures``, what else the run has done behind steps of its past."""
+    ``futures``, what else the run has done behind steps of its past; ``measures``, the number and the text of each that
+    somebody has typed."""
 
     playing: bool
     speed: float
@@ -61,6 +71,7 @@ class Status:
     appearance: Appearance
     backend: str
     futures: tuple[Future, ...]
+    measures: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,6 +158,8 @@ class Run:
         #: the step to go to, which is further than has been reached
         self._target: int | None = None
         self._clock, self._pace = self._clock_of(source, 1.0), Pace()
+        self._typed = Typed()
+        self._series: tuple[Network, Typed, dict[str, Series]] | None = None
         self._thread = Thread(target=self._drive, name="live run", daemon=True)
         self.failure: Exception | None = None
 
@@ -270,14 +283,41 @@ class Run:
                 asked.what(source)
             case Present():
                 pass
+            case Measure():
+                self._measure(self._typed.add(asked.text, source.network))
+            case Unmeasure():
+                self._measure(self._typed.without(asked.number))
             case _ if callable(asked):
                 self._source, self._view = asked(source)
+                if self._source is not source:
+                    self._typed = self._typed.on(self._source.network)
                 self._redraw(refuse)
                 self._clock = self._clock_of(self._source, self._clock.speed)
                 self._clock.start(now)
                 self._ended, self._target = False, None
             case _:
                 source.turn(asked)
+
+    def _measure(self, typed: Typed) -> None:
+        """Have these measures followed. Raises SourceError where a recording does not tell what one reads."""
+        before, self._typed = self._typed, typed
+        try:
+            self._source.history.follow(self._followed())
+        except (SpecError, BodyError, RecordingError) as error:
+            self._typed = before
+            raise SourceError(str(error)) from None
+
+    def _followed(self) -> dict[str, Series]:
+        """All series of the run, made anew where it has others."""
+        network, typed = self._source.network, self._typed
+        if self._series is None or self._series[0] is not network:
+            own = {name: one for name, (_, one) in series_of(network).items()}
+        elif self._series[1] is typed:
+            return self._series[2]
+        else:
+            own = {name: one for name, one in self._series[2].items() if name[0] == "e"}
+        self._series = network, typed, {**own, **typed.series}
+        return self._series[2]
 
     def _redraw(self, refuse: Refuse) -> None:
         """Make a view in the wanted appearance, if the current one has another, in a thread beside the run."""
@@ -389,9 +429,12 @@ class Run:
             appearance=self.appearance,
             backend=source.backend,
             futures=source.futures.all,
+            measures=self._typed.told,
         )
         seen = source.seen()
         glance, reach = self._view.glance(seen), source.reach
         left = source.futures.left
         before = None if left is None else left.history
+        for history in (source.history, *(() if before is None else (before,))):
+            history.follow(self._followed())
         return Shown(self._view, seen, glance, reach, status, source.history, before, source.body, source.quantities)

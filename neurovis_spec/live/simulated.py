@@ -21,6 +21,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.beside import Before, Beside
 from neurovis_spec.live.futures import Future, Futures
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
@@ -76,6 +77,7 @@ class SimulatedSource:
         self._probe = columns_of(self.network).probe
         self._shown, self._signals = ShownStates(self.network), Signals(self.network)
         self._ends, self._every = SetEnds(self.network), Quantities(self.network)
+        self._beside = Beside(self.network, len(self._every))
         #: those of the current step
         self.quantities: FloatArray | None = None
         self._signals.follow(simulation)
@@ -89,7 +91,8 @@ class SimulatedSource:
 
     def _begin(self, state: State, turned: Sequence[Turned], fed: Mapping[str, tuple[float, ...]]) -> None:
         self._past = Past(self._room)
-        self.history = Ring(len(self.network.neurons), len(self.network.connections), len(self._every))
+        quantities = len(self._every) + len(self._beside)
+        self.history = Ring(len(self.network.neurons), len(self.network.connections), quantities)
         self._fading = Fading(self.network)
         self._fed, self._turned = dict(fed), list(turned)
         #: what was true after the current step, where events have changed it since
@@ -387,6 +390,7 @@ class SimulatedSource:
         run = self._simulation
         step, weights, lesioned, held = run.k, run.connection_weights, run.lesioned, run.held
         pose, ends = run.pose, self._ends.of_run(run)
+        held_before = Before(run.slots, lesioned[0], _middle(run, pose))
         try:
             run.step({name: values if len(values) > 1 else values[0] for name, values in self._fed.items()})
         except ParameterError as error:  # what events set does not go with what was turned: the step was made without
@@ -394,7 +398,7 @@ class SimulatedSource:
         self._ended = run.ended
         previous = before.weights if before is not None and before.step == step - 1 else None
         activity, shown = run.activity, self._shown.of_run(run)
-        self.quantities = run.looked(self._every)
+        self.quantities = np.concatenate([run.looked(self._every), self._beside.now(run, held_before)])
         self.history.note(step, activity if shown is None else shown, weights, self.quantities)
         sent, seen = self._signals.of_run(run), None
         if self._fading:
@@ -402,3 +406,10 @@ class SimulatedSource:
             sent = self._fading.sent if self._fading.sends else sent
         snapshot = Snapshot(step, activity, weights, previous, seen, pose, run.sensed, shown, sent, ends)
         return Seen(snapshot, *lesioned, held, run.probed(self._probe))
+
+
+def _middle(run: Simulation, pose: FloatArray | None) -> FloatArray:
+    """Where the middle of the body is, x and y in metres, NaN where there is none."""
+    if pose is None or run.skeleton is None or not run.skeleton.points:
+        return np.full(2, np.nan)
+    return pose[3 * run.skeleton.middle :][:2]

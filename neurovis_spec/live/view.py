@@ -21,9 +21,10 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SPIKE, SYNAPSE
 from neurovis_spec.layout.model import RADIUS, Layout
 from neurovis_spec.layout.problem import in_direction
+from neurovis_spec.live.beside import Beside
 from neurovis_spec.live.commands import AS_IT_IS, Appearance
 from neurovis_spec.live.curves import Curves, curves_of
-from neurovis_spec.live.declared import declared
+from neurovis_spec.live.declared import declared, words_of
 from neurovis_spec.live.drawing import Moved, content, moved
 from neurovis_spec.live.history import Members
 from neurovis_spec.live.source import Mask, Seen
@@ -52,6 +53,8 @@ RASTER_ROWS = 64
 #: Bits of a kind: a line that ends in no arrow, what is lesioned, a connection that inhibits, as its synapse or its
 #: negative weight says, a clamped neuron, a neuron whose activity is no finite number.
 BAR, FAINT, NEGATIVE, CLAMPED, UNDEFINED = 1, 2, 4, 4, 8
+#: Errors, inputs, measures and sensors have their number with the place of their kind here above so many bits.
+KINDS, KIND = "?eims", 28
 #: The higher bits of the kind of a line hold the size of its weight, from 0 to SHARES, the largest of its scale.
 SHARES, _SHARE = 31, 8
 
@@ -94,6 +97,8 @@ class View:
     listed: Listed
     #: what a page shows the course of from the beginning
     curves: Curves
+    #: where inputs and sensors stand
+    beside: Beside
     #: what stays of a picture of the same network in which more changes, at least so wide (page units)
     planned: Callable[[Network, float], tuple[Gathered, Plan]]
 
@@ -131,19 +136,19 @@ class View:
 
     def values(self, seen: Seen, items: Iterable[str], quantities: FloatArray | None = None) -> dict[str, float]:
         """Exact activities, or states that are shown (``n3``), weights (``c5``), ``quantities`` (``c5.g``) and errors
-        (``e0``) at a step, by these ids; unknown ones are left out, and quantities of which nothing is known."""
+        (``e0``) at a step, by these ids; unknown ones are left out, and quantities of which nothing is known. Inputs
+        (``i0``) and sensors (``s0``) are among the quantities."""
         snapshot = self.drawn.snapshot(seen.snapshot)
         result = dict[str, float]()
         for item in items:
             key, _, name = item.partition(".")
             values, index = snapshot.told if item[0] == "n" else snapshot.weights, int(key[1:])
-            if item[0] == "e":
-                error = self.members(item)
-                if error is not None:
+            if item[0] == "e" and not name:
+                for error in self.curves.errors[index : index + 1]:
                     result[item] = float(error.join(seen.snapshot.told[error.read][None])[0])
-            elif name:
+            elif name or item[0] not in "nc":
                 members = None if quantities is None else self.members(item)
-                if members is not None and quantities is not None:
+                if members is not None and quantities is not None and not members.series:
                     value = float(members.join(quantities[members.read][None])[0])
                     result |= {} if math.isnan(value) else {item: value}
             elif index < len(values):
@@ -151,12 +156,12 @@ class View:
         return result
 
     def members(self, item: str) -> Members | None:
-        """What of the network an item stands for (``n3``, ``c5``), what of that has a name (``c5.g``), or an error
-        (``e0``); None where there is none."""
+        """What of the network an item stands for (``n3``, ``c5``), what of that has a name (``c5.g``), a number of an
+        input (``i0``) or of a sensor (``s0``), or a series: an error (``e0``), a measure (``m0``); None where there is
+        none."""
         key, _, name = item.partition(".")
-        if item[0] == "e":
-            errors = self.curves.errors[int(key[1:]) :]
-            return errors[0] if errors and not name else None
+        if item[0] not in "nc":
+            return None if name else self._beside_members(item)
         neurons = item[0] == "n"
         members = np.flatnonzero((self.drawn.unit if neurons else self.drawn.bundle) == int(key[1:]))
         if not name:
@@ -165,6 +170,13 @@ class View:
             places = self.quantities.places("neuron" if neurons else "connection", name, members)
             found = Members("quantities", places, "sum" if not neurons and name == SYNAPSE.gives else "mean")
         return found if len(found.indices) else None
+
+    def _beside_members(self, item: str) -> Members | None:
+        """What stands beside the network."""
+        if item[0] in "em":
+            return Members.of_series(item) if item[0] == "m" or item in self.curves.series else None
+        places = self.beside.places("inputs" if item[0] == "i" else "sensors")[int(item[1:]) :][:1]
+        return Members("quantities", places) if len(places) else None
 
     def raster(self, item: str) -> tuple[tuple[str, ...], tuple[Members, ...]]:
         """Of the groups of the neurons that an item (``n3``) is drawn for those that fire: the names of the first and
@@ -183,11 +195,12 @@ class View:
         return (whole.names[firing[0]], whole.names[firing[-1]]), tuple(Members("quantities", of) for of in places)
 
     def place(self, item: str) -> tuple[int, int]:
-        """The number of an item that there is among connections, then neurons, then errors; and that of its name among
-        those that the page knows, from 1 on, 0 without one."""
+        """The number of an item that there is among connections, then neurons, or with its kind in its highest four
+        bits; and that of its name among those that the page knows, from 1 on, 0 without one."""
         key, _, name = item.partition(".")
-        lines, discs = len(self.drawn.counts), len(self.drawn.sizes)
-        index = int(key[1:]) + {"c": 0, "n": lines, "e": lines + discs}[item[0]]
+        if item[0] not in "nc":
+            return KINDS.index(item[0]) << KIND | int(key[1:]), 0
+        index = int(key[1:]) + (0 if item[0] == "c" else len(self.drawn.counts))
         return index, 1 + self.listed.lists[self.listed.of[index]].index(name) if name else 0
 
     def moved(self, layout: Layout) -> Moved:
@@ -255,15 +268,19 @@ def view_of(
     listed = quantities.listed(Glyphs(drawn.unit, len(drawn.sizes)), Glyphs(drawn.bundle, len(drawn.counts)))
     names = {"named": [list(one) for one in listed.lists], "names": listed.of.tolist() if len(quantities) else []}
     curves = curves_of(drawn)
+    beside = Beside(network, len(quantities))
+    told_beside = {"inputs": beside.input_names, "sensors": beside.sensor_names, "words": words_of(network)}
     begins = {
         "boxes": {name: list(one) for name, one in planned.boxes.items()},
         "curves": [asdict(curve) for curve in curves.shown],
+        "beside": told_beside,
     }
     more = {**declared(compiled), **ranges_of(drawn), **names, **begins, "themes": list(THEMES), "themed": themed}
     words = content(drawn.network, scene, rows, constants, more)
     otherwise = otherwise or partial(view_of, compiled, gains, theme, engine, layout=layout)
     anew = partial(_planned, stands, seen, settings)
-    return View(drawn, seen, planned, largest, stands, words, appearance, otherwise, quantities, listed, curves, anew)
+    names_of = quantities, listed, curves, beside
+    return View(drawn, seen, planned, largest, stands, words, appearance, otherwise, *names_of, anew)
 
 
 def _planned(

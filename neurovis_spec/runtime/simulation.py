@@ -206,6 +206,11 @@ class Simulation:
         return None if self._body is None else self._body.sensed
 
     @property
+    def given(self) -> FloatArray:
+        """The vector of all inputs at the last step, (inputs,), a copy; 0 before the first."""
+        return self._stepper.vector[: self.network.input_size].copy()
+
+    @property
     def pose(self) -> FloatArray | None:
         """The pose of the body at step k, None where there is nothing to draw; ``skeleton`` says how it is drawn."""
         return None if self._body is None else self._body.pose()
@@ -254,6 +259,11 @@ class Simulation:
         """The parameters of the spec, as they are for the next step."""
         slots = self.network.settable.index
         return {name: float(self._state.conditions.parameters[slots[name]]) for name in self.network.parameters}
+
+    @property
+    def slots(self) -> FloatArray:
+        """The value of each slot (``Settable.slots``), as it is for the next step; a copy."""
+        return self._state.conditions.parameters.copy()
 
     @property
     def variables(self) -> FloatArray:

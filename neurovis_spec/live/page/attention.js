@@ -2,6 +2,7 @@
  * Attention: what is pointed at, and what is held; its values, and what stands out with it.
  */
 
+import { isBeside } from './beside.js';
 import { halfway } from './marks.js';
 import { say } from './say.js';
 
@@ -105,10 +106,10 @@ export class Attention {
     this.link.ask('look', { items: this.wanted() });
   }
 
-  /** The ids of neurons, connections and errors whose values are shown, of what they have with its name. @returns {string[]} */
+  /** The ids of neurons, connections and what is beside them whose values are shown, of what they have with its name. @returns {string[]} */
   wanted() {
     const all = new Set([this.pointed, this.held, ...this.also, ...this.listed]);
-    return [...all].filter((id) => id[0] === 'e' || this.isKnown(id.split('.')[0])).slice(0, 64);
+    return [...all].filter((id) => isBeside(id) || this.isKnown(id.split('.')[0])).slice(0, 64);
   }
 
   /** Whether there is such a neuron or connection, drawn or not. @param {string} id @returns {boolean} */

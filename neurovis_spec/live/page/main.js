@@ -4,6 +4,7 @@
 
 import { Attention } from './attention.js';
 import { Axis } from './axis.js';
+import { Beside, isBeside } from './beside.js';
 import { Body } from './body.js';
 import { Camera } from './camera.js';
 import { channels, luminance } from './colours.js';
@@ -12,6 +13,7 @@ import { Drawing } from './draw.js';
 import { listKeys } from './keys.js';
 import { Marks } from './marks.js';
 import { Matrix } from './matrix.js';
+import { Measuring } from './measuring.js';
 import { Outline } from './outline.js';
 import { arrangePanels, greet } from './panels.js';
 import { under } from './pick.js';
@@ -127,8 +129,10 @@ const link = new Link({
     if (first) blank();
     choose(matrix !== null);
     part('titled').textContent = scene.title;
+    beside.use(scene);
     attention.use(scene);
     strips.use();
+    measuring.use(scene);
     axis.use(scene.time);
     if (first) strips.begin(scene.curves);
     turning.use(scene);
@@ -168,6 +172,8 @@ const link = new Link({
       scrubber.status(message);
       turning.status(message);
       placing.status(message);
+      strips.owner = message.owner;
+      strips.measures(message.measures);
     } else if (message.type === 'values') attention.take(message);
     else if (message.type === 'body') body.use(message.skeleton, message.start);
     else if (message.type === 'findings') controls.found(message);
@@ -176,7 +182,8 @@ const link = new Link({
     else if (message.type === 'saving') {
       placing.saving(message);
       if (message.written) controls.tell(`saved ${message.files.join(', ')}`);
-    } else if (message.type === 'refused') {
+    } else if (message.type === 'measured') measuring.take(message);
+    else if (message.type === 'refused') {
       refusal.tell(message.reason);
       if (placing.waiting) placing.cancel();
     }
@@ -196,10 +203,12 @@ const attention = new Attention(link, zoom, redraw, (group) => {
   outline.hold();
   strips.hold(group);
 });
-const outline = new Outline(attention, part, (id) => go(id));
+const beside = new Beside();
+const outline = new Outline(attention, beside, part, (id) => go(id));
 const scrubber = new Scrubber(link, part, redraw);
 const axis = new Axis(scrubber, part);
-const strips = new Strips(link, attention, scrubber, axis, part('strips'), part('under'));
+const strips = new Strips(link, attention, beside, scrubber, axis, part('strips'), part('under'));
+const measuring = new Measuring(link, strips, part);
 const body = new Body(part('embodied'), part('posed'), part('bodily'), redraw);
 
 /** Show the matrix in place of the picture, or the picture. @param {boolean} asMatrix */
@@ -220,6 +229,10 @@ function choose(asMatrix) {
 
 /** Hold a neuron, a connection or a bundle, or go to a box; where it is not seen, the picture is moved. @param {string} id */
 function go(id) {
+  if (isBeside(id)) {
+    strips.pin(id);
+    return;
+  }
   if (zoom.boxes.some((one) => one.id === id)) enter(id);
   attention.hold(id);
   if (ITEM.test(id) && attention.held === id) see(id);
@@ -325,6 +338,7 @@ Object.assign(controls.keys, {
   y: ['open or close the panel of the body', () => body.toggle()],
   m: ['the matrix of the weights in place of the picture, and back', () => choose(!matrix)],
   g: ['each group as one node, with the pathways between them, and back', () => turning.appearance.toggle()],
+  c: ['add a curve by its name, or by a measure', () => measuring.toggle()],
   p: ['pin the curve of what is held, or unpin it', () => strips.toggle()],
   '<': ['show more of the past', () => scrubber.more(1)],
   '>': ['show less of the past', () => scrubber.more(-1)],

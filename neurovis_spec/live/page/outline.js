@@ -2,10 +2,12 @@
  * The outline: boxes, neurons and connections as a list of names and values, to search, to read and to hold.
  */
 
+import { isBeside } from './beside.js';
 import { search } from './search.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./protocol.js').Group} Group */
+/** @typedef {import('./beside.js').Beside} Beside */
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./search.js').Entry} Entry */
@@ -16,10 +18,11 @@ const LISTED = 100,
 
 /** The panel with the list. */
 export class Outline {
-  /** @param {Attention} attention @param {(id: string) => HTMLElement} find @param {(id: string) => void} taken called with
+  /** @param {Attention} attention @param {Beside} beside @param {(id: string) => HTMLElement} find @param {(id: string) => void} taken called with
    * what is chosen */
-  constructor(attention, find, taken) {
+  constructor(attention, beside, find, taken) {
     this.attention = attention;
+    this.beside = beside;
     this.find = find;
     this.panel = find('outline');
     this.field = /** @type {HTMLInputElement} */ (find('search'));
@@ -46,13 +49,15 @@ export class Outline {
   /** Another network. @param {Scene} scene */
   use(scene) {
     this.entries = [];
+    for (const { id, title } of this.beside.groups.values())
+      if ('is'.includes(id[0])) this.entries.push({ id, name: title, more: this.beside.kind(id) });
     this.more(scene.groups);
   }
 
   /** There is more to be listed. @param {Group[]} groups */
   more(groups) {
-    // boxes and bundles first, then neurons, then connections
-    const rank = (/** @type {Entry} */ { id }) => 'nc'.indexOf(id[0]),
+    // boxes and bundles first, then neurons, connections, inputs and sensors
+    const rank = (/** @type {Entry} */ { id }) => (/^[ncis]\d/.test(id) ? 'ncis'.indexOf(id[0]) : -1),
       known = new Set(this.entries.map(({ id }) => id));
     const added = groups
       .filter(({ id }) => /^([nc]\d+$|box:|instance:|bundle:)/.test(id) && !known.has(id))
@@ -149,7 +154,7 @@ export class Outline {
       this.shown
         .slice(from, from + VALUED)
         .map(({ id }) => id)
-        .filter((id) => /^[nc]\d+$/.test(id)),
+        .filter((id) => /^[ncis]\d+$/.test(id)),
     );
   }
 
@@ -192,7 +197,10 @@ export class Outline {
     this.shown.forEach(({ id }, at) => {
       const [name, more] = /** @type {Iterable<HTMLElement>} */ (this.list.children[at].children);
       if (name.textContent && !around.has(id) && /^[nc]\d+$/.test(id)) return;
-      const [first, ...rest] = this.attention.words(id, look).split('\n'),
+      const said = isBeside(id)
+          ? `${this.beside.words(id, this.attention.values)}\nto be pinned`
+          : this.attention.words(id, look),
+        [first, ...rest] = said.split('\n'),
         words = rest.join(', ');
       if (name.textContent !== first) name.textContent = first;
       if (more.textContent !== words) more.textContent = words;

@@ -24,7 +24,7 @@ import { isStill } from './camera.js';
  *   time: {step: number, unit: string} | null, discs: number, lines: number, parameters: Declared[],
  *   ranges: [number | null, number | null, number][], ranged: number[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
- *   themed: boolean, named: string[][], names: number[], curves: Curve[], order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
+ *   themed: boolean, named: string[][], names: number[], curves: Curve[], beside: {inputs: string[], sensors: string[], words: string[]}, order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
  *   told: string[], boxes: Object<string, number[]>, groups: Group[]}} Scene */
 /** Signals in one axis, by what they are asked for, the first in front, and their names.
  * @typedef {{items: string[], names: string[]}} Curve */
@@ -44,13 +44,14 @@ import { isStill } from './camera.js';
  * @typedef {{number: number, at: number, last: number, turned: Turned[], within: Future[]}} Future */
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
  *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
- *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[]}} Status */
+ *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[], measures: {number: number, text: string}[]}} Status */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
  *   | {type: 'body', skeleton: Skeleton | null, start: number[]}
  *   | {type: 'findings', text: string, errors: boolean}
  *   | {type: 'moved', discs: Object<string, number[]>, lines: Object<string, number[][]>}
  *   | {type: 'placed', neurons: string[], undo: boolean, files: boolean}
  *   | {type: 'saving', files: string[], diff: string, written: boolean}
+ *   | {type: 'measured', text: string, findings: {start: number, end: number, message: string, hint: string}[]}
  *   | {type: 'refused', reason: string}} Message */
 /** @typedef {{scene: (scene: Scene) => void, frame: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
  *   left: (traces: Traces) => void,
@@ -66,6 +67,7 @@ const SCENE = 1,
   RASTER = 5,
   LEFT = 6,
   HELD = 7,
+  KIND = 28,
   HEAD = 40;
 
 /** Unpack what is compressed behind a head. @param {ArrayBuffer} buffer */
@@ -131,8 +133,9 @@ function unpackTraces(buffer, scene) {
   const ranges = new Map();
   const which = new Uint32Array(buffer, 24 + 4 * count, count);
   new Uint32Array(buffer, 24, count).forEach((item, at) => {
-    const { lines, discs } = scene,
-      id = item < lines ? `c${item}` : item < lines + discs ? `n${item - lines}` : `e${item - lines - discs}`,
+    const { lines } = scene,
+      kind = item >>> KIND,
+      id = kind ? `${'?eims'[kind]}${item & ((1 << KIND) - 1)}` : item < lines ? `c${item}` : `n${item - lines}`,
       name = which[at] ? `.${namesOf(scene, id)[which[at] - 1]}` : '';
     ranges.set(id + name, new Float32Array(buffer, 24 + 8 * count + 8 * bins * at, 2 * bins));
   });

@@ -8,6 +8,7 @@ import { THUMB } from './scrubber.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./axis.js').Axis} Axis */
+/** @typedef {import('./beside.js').Beside} Beside */
 /** @typedef {import('./protocol.js').Curve} Curve */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
@@ -48,13 +49,18 @@ function element(tag, of) {
 
 /** The strips: first what is pinned, at the end what is held. */
 export class Strips {
-  /** @param {Link} link @param {Attention} attention @param {Scrubber} scrubber @param {Axis} axis
+  /** @param {Link} link @param {Attention} attention @param {Beside} beside @param {Scrubber} scrubber @param {Axis} axis
    * @param {HTMLElement} place @param {HTMLElement} under what is said of where the pointer is */
-  constructor(link, attention, scrubber, axis, place, under) {
+  constructor(link, attention, beside, scrubber, axis, place, under) {
     this.axis = axis;
     this.under = under;
     this.link = link;
     this.attention = attention;
+    this.beside = beside;
+    /** the ids of the measures that have had a strip @type {Set<string>} */
+    this.met = new Set();
+    /** the measures that there are, as a text */
+    this.typed = '[]';
     this.scrubber = scrubber;
     this.place = place;
     /** @type {Strip[]} */
@@ -62,6 +68,8 @@ export class Strips {
     this.held = this.strip();
     this.asked = '';
     this.when = -LOST;
+    /** whether what changes the run is taken from here */
+    this.owner = false;
     /** whether an answer is awaited */
     this.waiting = false;
     /** how the future went that was left last @type {Traces | null} */
@@ -123,12 +131,39 @@ export class Strips {
     return strip;
   }
 
-  /** The neuron, the connection or the error of an id. @param {string} id @returns {Group | undefined} */
+  /** The neuron, the connection, or what else has an id. @param {string} id @returns {Group | undefined} */
   group(id) {
-    const error = id[0] === 'e' && this.link.scene?.curves.find(({ items }) => items[0] === id);
-    return error
-      ? { id, title: error.names[0], data: { error: error.names[0] }, shapes: [] }
-      : this.attention.groups.get(id);
+    return this.beside.groups.get(id) ?? this.attention.groups.get(id);
+  }
+
+  /** Whether there is no room for another strip. */
+  get full() {
+    return this.pinned.length >= PINS;
+  }
+
+  /** The id of what is called so, '' where nothing is. @param {string} name @returns {string} */
+  named(name) {
+    const shown = name.replaceAll(/\s*->\s*/g, ' → '),
+      all = [...this.attention.groups.values(), ...this.beside.groups.values()];
+    return all.find(({ data, title }) => data.neuron === name || title.split('\n')[0] === shown)?.id ?? '';
+  }
+
+  /** Pin the strip of an id, where it is not yet. @param {string} id */
+  pin(id) {
+    if (!this.pinned.some(({ key }) => key === id)) this.toggle({ id, what: '', key: id });
+  }
+
+  /** There are these measures: each gets a strip, and loses it with the measure. @param {{number: number, text: string}[]} measures */
+  measures(measures) {
+    if (JSON.stringify(measures) === this.typed) return;
+    this.typed = JSON.stringify(measures);
+    this.beside.measure(measures);
+    this.pinned = this.pinned.filter(({ id }) => id[0] !== 'm' || this.group(id));
+    const ids = measures.map(({ number }) => `m${number}`),
+      fresh = ids.filter((id) => !this.met.has(id));
+    this.met = new Set(ids);
+    for (const id of fresh) this.pin(id);
+    if (!fresh.length) this.list();
   }
 
   /** Pin the strips that a page begins with, as far as there is room for them. @param {Curve[]} curves */
@@ -214,11 +249,10 @@ export class Strips {
 
   /** Another network; what has the same name in it stays pinned. */
   use() {
-    const groups = [...this.attention.groups.values()],
-      curves = this.link.scene?.curves ?? [],
-      errors = curves.flatMap(({ items }) => (items[0][0] === 'e' ? (this.group(items[0]) ?? []) : []));
+    const groups = [...this.attention.groups.values(), ...this.beside.groups.values()],
+      curves = this.link.scene?.curves ?? [];
     this.pinned = this.pinned.filter((strip) => {
-      const same = [...groups, ...errors].find(({ data }) => JSON.stringify(data) === strip.data);
+      const same = groups.find(({ data }) => JSON.stringify(data) === strip.data);
       if (same)
         this.of(
           strip,
@@ -240,8 +274,11 @@ export class Strips {
     this.show();
   }
 
-  /** Pin what a strip shows, by default that of what is held, or unpin it. @param {Strip} [of] */
+  /** Pin what a strip shows, by default that of what is held, or unpin it; a measure is none any more then.
+   * @param {Pick<Strip, 'id' | 'what' | 'key'>} [of] */
   toggle({ id, what, key } = this.held) {
+    if (id[0] === 'm' && this.owner && this.pinned.some((strip) => strip.key === key))
+      this.link.ask('unmeasure', { number: Number(id.slice(1)) });
     const group = this.group(id),
       known = this.pinned.findIndex((strip) => strip.key === key);
     const focused = this.place.contains(document.activeElement);
