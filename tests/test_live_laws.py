@@ -48,7 +48,7 @@ from neurovis_spec.live.turns import (
     Turn,
     Turned,
     Weigh,
-    fed_by,
+    feed,
     rules,
     taken,
     turn,
@@ -78,6 +78,8 @@ events:
   - {at: 9, set: {pull: pull + 0.2}}
   - {from: 4, to: 12, clamp: {A1: pull}}
   - {at: 11, learning: {A -> B: false}}
+  - {at: 5, feed: {push: 0.3}}
+  - {at: 10, feed: {push: null}}
 outputs: {drive: B, charge: S.v}
 """
 PARTS = """neurovis: 1
@@ -328,12 +330,12 @@ class Model:
             snapshot = Snapshot(step, run.activity, weights, before, None, pose, run.sensed)
             for what in (what for at, what in self.turns if at == step):
                 if isinstance(what, Feed):
-                    fed = fed_by(self.compiled.network, fed, what)
+                    fed = feed(run, fed, what)
                 else:
                     turn(run, what)
                 masks = (*run.lesioned, run.held)
             before = weights
-            yield Stand(Seen(snapshot, *masks), dict(run.parameters), dict(fed), run.stopped.tolist())
+            yield Stand(Seen(snapshot, *masks), dict(run.parameters), {**run.fed, **fed}, run.stopped.tolist())
 
     def turned(self, step: int, what: Turn) -> None:
         """A turn was taken."""

@@ -21,7 +21,7 @@ from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.saving import film, picture, recording, steps_for, told_by
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError
-from neurovis_spec.live.turns import Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh
+from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh
 from neurovis_spec.live.view import view_of
 from neurovis_spec.runtime.recording import Recording
 
@@ -89,9 +89,10 @@ FOLLOWING = """neurovis: 1
 name: following
 time: {dt: 0.05, steps: 40}
 parameters: {pull: {value: 0.1, min: 0, max: 1}, twice: 2 * pull, mix: 0.5}
+inputs: {push: {}, wave: {size: 3, expression: sin(k/3)}}
 neurons:
-  A: {count: 3, activation: tanh, noise: "normal(0, 0.05)"}
-  B: {activation: tanh, bias: twice}
+  A: {count: 3, activation: tanh, noise: "normal(0, 0.05)", input: wave}
+  B: {activation: tanh, bias: twice, input: push}
   S: {model: integrate_and_fire, bias: 0.4}
 connections:
   A -> A: {pattern: all_to_all, weight: "uniform(-1, 1)", delay: 2}
@@ -103,6 +104,7 @@ events:
   - {at: 6, lesion: [A2]}
   - {at: 9, mend: [A2]}
   - {at: 9, set: {pull: 0.3}}
+  - {at: 7, feed: {push: 0.4}}
 """
 LEGS = """neurovis: 1
 name: legs
@@ -122,35 +124,37 @@ events:
 CART = (
     toy_bodies.SPEC.replace("{gain: 0.8}", "{gain: 0.8, much: -0.7}").replace("-0.7}\n  A", "much}\n  A") + "events:\n"
 )
-#: Specs, how they are compiled, and what can be turned: neurons, connections, rules, parameters.
+#: Specs, how they are compiled, and what can be turned: neurons, connections, rules, parameters, inputs.
 SAVED: dict[str, tuple[str, Callable[[str], nv.CompiledNetwork], tuple[list[str], ...]]] = {
     "following": (
         FOLLOWING,
         nv.compile_text,
-        (["A3", "B"], ["A1 -> A3", "S -> A1"], ["A -> B"], ["pull", "twice", "mix"]),
+        (["A3", "B"], ["A1 -> A3", "S -> A1"], ["A -> B"], ["pull", "twice", "mix"], ["push", "wave"]),
     ),
-    "legs": (LEGS, nv.compile_text, (["left1.K2", "C"], ["left2.K1 -> left2.O"], ["right.O -> right.K"], ["gain"])),
+    "legs": (LEGS, nv.compile_text, (["left1.K2", "C"], ["left2.K1 -> left2.O"], ["right.O -> right.K"], ["gain"], [])),
     "body": (
         CART,
         lambda text: toy_bodies.carted(spec=text),
-        (["A1", "O2"], ["P -> O1"], ["W -> O"], ["gain", "much"]),
+        (["A1", "O2"], ["P -> O1"], ["W -> O"], ["gain", "much"], ["arms"]),
     ),
     "whole body": (
         CART,
         lambda text: toy_bodies.carted("whole", spec=text),
-        (["P"], ["W -> O2"], ["W -> O"], ["much"]),
+        (["P"], ["W -> O2"], ["W -> O"], ["much"], ["arms", "place"]),
     ),
 }
 
 
 def turns(parts: tuple[list[str], ...]) -> st.SearchStrategy[Turn]:
     """Turns that the page can copy as events."""
-    neurons, connections, rules, parameters = map(st.sampled_from, parts)
+    *names, inputs = parts
+    neurons, connections, rules, parameters = map(st.sampled_from, names)
+    fed = [st.builds(Feed, st.sampled_from(inputs), st.sampled_from([(), (0.5,), (0.1, 0.2, 0.3)]))] if inputs else []
     value, either = st.sampled_from([0.0, 0.25, 0.6, 1.0]), neurons | connections
     return st.one_of(
         st.builds(lambda name, one: Set({name: one}), parameters, value),
         st.builds(Hold, neurons, value), st.builds(Release, neurons), st.builds(Learn, rules, st.booleans()),
-        st.builds(Lesion, either), st.builds(Mend, either), st.builds(Weigh, connections, value),
+        st.builds(Lesion, either), st.builds(Mend, either), st.builds(Weigh, connections, value), *fed,
     )  # fmt: skip
 
 
@@ -168,6 +172,8 @@ def events(turned: Sequence[Turned]) -> str:
                 last[entry.step + 1, "part", part] = entry.turn
             case Learn(connections):
                 last[entry.step + 1, "learn", connections] = entry.turn
+            case Feed(name):
+                last[entry.step + 1, "feed", name] = entry.turn
             case Weigh(connections):
                 last[entry.step + 1, "weigh", connections] = entry.turn
     lines, all = [], list(last.items())
@@ -186,6 +192,9 @@ def events(turned: Sequence[Turned]) -> str:
                 lines.append(f"{{at: {at}, mend: {name}}}")
             case Weigh(_, value):
                 lines.append(f"{{at: {at}, set: {{{name}: {value!r}}}}}")
+            case Feed(_, given):
+                number = str([*given]) if len(given) > 1 else given[0] if given else "null"
+                lines.append(f"{{at: {at}, feed: {{{name}: {number}}}}}")
             case Learn(_, on):
                 lines.append(f"{{at: {at}, learning: {{{name}: {str(on).lower()}}}}}")
     return "".join(f"  - {line}\n" for line in lines)
@@ -245,7 +254,7 @@ def test_the_pictures_that_are_saved_are_those_of_the_run_of_the_spec_with_the_e
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     toy_bodies.registered(monkeypatch)
-    text, compile, (neurons, _, _, parameters) = SAVED[name]
+    text, compile, (neurons, _, _, parameters, _) = SAVED[name]
     network = compile(text if text is FOLLOWING else text.removesuffix("events:\n"))
     source = SimulatedSource(network.simulator())
     for what in (Set({parameters[0]: 0.6}), Hold(neurons[0], 0.25), Mend(neurons[1]), Lesion(neurons[1])):

@@ -263,7 +263,10 @@ def test_a_slider_that_is_dragged_while_it_plays_is_one_turn(tmp_path: Path) -> 
             assert isinstance(past, list)
             assert len(past) >= 3, "it had its effect while it was dragged"
             assert not any("," in row for row in past), "and was one turn all the time"
-            assert await opened.ask(f"{EVENTS}.split('\\n').length") == 3
+            copied = str(await opened.ask(EVENTS)).splitlines()
+            assert len(copied) == 3
+            assert copied[2].startswith("# step "), "and its comment says what it does not hold"
+            assert copied[2].endswith(": what pull was while it was dragged is left out")
             here = await opened.ask(STEP)
             await opened.until(f"{STEP} > {here} + 1")
             await opened.ask("document.querySelector('#turned button').click()")
@@ -306,6 +309,8 @@ def test_inputs_without_a_source_are_fed_by_sliders_until_they_are_reset(tmp_pat
             await turned(opened, "feed push = 0, 0.5")
             await opened.ask("((one) => { one.value = -1; one.onchange(); })(document.querySelector('#feed-wind'))")
             await turned(opened, "feed wind = -1", "feed push = 0, 0.5")
+            rows = [row.partition(", ")[2] for row in str(await opened.ask(EVENTS)).splitlines()[1:]]
+            assert rows == ["feed: {push: [0, 0.5]}}", "feed: {wind: -1}}"]
             await opened.key("]")
             await opened.key("]")
             await opened.ask("document.querySelector('#step').click()")

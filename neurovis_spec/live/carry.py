@@ -9,7 +9,7 @@ step.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Projection
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError
-from neurovis_spec.live.turns import Feed, Turned, turn
+from neurovis_spec.live.turns import Feed, Turned, feed, turn
 from neurovis_spec.runtime.controls import lose
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
@@ -51,13 +51,11 @@ def _carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
         then = old.leave()
     except BodyError:  # a body that cannot be kept
         return SimulatedSource(simulation)
-    sizes = {entry.name: entry.size for entry in network.inputs}
-    done = _replay(simulation, then.k, [entry for entry in turned if entry.step < then.k], sizes)
+    done, fed = _replay(simulation, then.k, [entry for entry in turned if entry.step < then.k])
     state = simulation.state()
     _carry(was, then, network, state)
     _restore(simulation, was, then, state)
-    kept = {name: values for name, values in old.fed.items() if sizes.get(name) == len(values)}
-    source = SimulatedSource(simulation, state, done, kept, origin)
+    source = SimulatedSource(simulation, state, done, fed, origin)
     for entry in (entry for entry in turned if entry.step >= then.k):
         with suppress(SourceError):  # of what is no longer there
             source.turn(entry.turn)
@@ -83,9 +81,12 @@ def _kind(body: BodySettings) -> tuple[object, ...]:
     return body.kind, body.given, body.path, body.substeps
 
 
-def _replay(simulation: Simulation, k: int, turned: Sequence[Turned], inputs: Mapping[str, int]) -> list[Turned]:
+def _replay(
+    simulation: Simulation, k: int, turned: Sequence[Turned]
+) -> tuple[list[Turned], dict[str, tuple[float, ...]]]:
     """Change what events until step k change, and turn what was turned, in the order of their steps; gives what could
-    be turned."""
+    be turned, and what is fed by hand."""
+    fed = dict[str, tuple[float, ...]]()
     events = [(change.at, 0, None) for change in simulation.network.changes if change.at <= k]
     done = []
     for at, _, entry in sorted([*events, *((entry.step + 1, 1, entry) for entry in turned)], key=lambda item: item[:2]):
@@ -96,14 +97,14 @@ def _replay(simulation: Simulation, k: int, turned: Sequence[Turned], inputs: Ma
         if entry is None:
             continue
         try:
-            if not isinstance(entry.turn, Feed):
+            if isinstance(entry.turn, Feed):
+                fed = feed(simulation, fed, entry.turn)
+            else:
                 turn(simulation, entry.turn)
-            elif entry.turn.name not in inputs:
-                continue
         except (ValueError, KeyError):  # of what is no longer there
             continue
         done.append(entry)
-    return done
+    return done, fed
 
 
 def _carry(was: Network, old: State, network: Network, state: State) -> None:

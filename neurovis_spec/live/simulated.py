@@ -36,7 +36,7 @@ from neurovis_spec.live.turns import (
     Turned,
     Weigh,
     carried_out,
-    fed_by,
+    feed,
     opposite,
     rules,
     taken,
@@ -137,8 +137,8 @@ class SimulatedSource:
 
     @property
     def fed(self) -> Mapping[str, tuple[float, ...]]:
-        """What is fed to inputs."""
-        return self._fed
+        """What is fed to inputs, by hand and by events."""
+        return {**self._simulation.fed, **self._fed}
 
     @property
     def learning(self) -> Mapping[str, bool | None]:
@@ -337,13 +337,13 @@ class SimulatedSource:
         weight = None
         if isinstance(what, Weigh):
             weight = self._simulation.weight_of(what.connections)
-        return opposite(what, self._turned, self.parameters, self._fed, weight)
+        return opposite(what, self._turned, self.parameters, self.fed, weight)
 
     def _turn(self, what: Turn) -> str:
         """Apply a turn; why it cannot be, and then nothing has changed."""
         try:
             if isinstance(what, Feed):
-                self._fed = fed_by(self.network, self._fed, what)
+                self._fed = feed(self._simulation, self._fed, what)
             else:
                 turn(self._simulation, what)
         except (ValueError, KeyError) as error:

@@ -204,6 +204,15 @@ def fed_by(network: Network, fed: Mapping[str, tuple[float, ...]], what: Feed) -
     return {**fed, what.name: (what.values * entry.size)[: entry.size]}
 
 
+def feed(simulation: Simulation, fed: Mapping[str, tuple[float, ...]], what: Feed) -> dict[str, tuple[float, ...]]:
+    """Take a turn that feeds an input; what is ``fed`` by hand then, but for inputs that events of the spec feed, too:
+    these the simulation itself is told, so that of it and of events the latest counts. Raises ValueError."""
+    values = fed_by(simulation.network, fed, what)
+    if what.name in simulation.network.settable.feeds:
+        simulation.feed(what.name, values.pop(what.name, ()))
+    return values
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Rule:
     """The rules at ``connections``, a reference: as they are written, and the ``members`` that they are of."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import reprlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -37,7 +37,7 @@ from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied, embodied
 from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unknown
 from neurovis_spec.runtime.formed import Forming
-from neurovis_spec.runtime.inputs import InputReader
+from neurovis_spec.runtime.inputs import InputError, InputReader
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.quantities import Quantities
 from neurovis_spec.runtime.record import end_values
@@ -382,6 +382,26 @@ class Simulation:
             raise ParameterError(str(error)) from None
         self._ended = None
         self._reader.use(state)
+
+    @property
+    def fed(self) -> Mapping[str, tuple[float, ...]]:
+        """What inputs are fed now that events feed, by their names."""
+        now, index = self._state.conditions.parameters, self.network.input_index
+        found = {}
+        for name, first in self.network.settable.feeds.items():
+            if now[first]:
+                found[name] = tuple(now[first + 1 : first + 1 + index[name].size].tolist())
+        return found
+
+    def feed(self, name: str, values: Sequence[float] = ()) -> None:
+        """Feed an input that events feed, too, these values from step k on, as an event does, until one of a later step
+        feeds it anew; none: its source again. Raises InputError for an input that none feeds."""
+        first = self.network.settable.feeds.get(name)
+        if first is None:
+            raise InputError(f"no event feeds the input '{name}': give step() its values")
+        given = dict(enumerate(map(float, values), first + 1))
+        self._controls.set(self._state.conditions, self._state.weights, {first: float(bool(given)), **given})
+        self._reader.use(self._state)
 
     def weight_of(self, connections: str) -> float | None:
         """w[k] of the first of the connections (``K -> O``) that a reference names; None where it names none."""
