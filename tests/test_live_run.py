@@ -218,13 +218,12 @@ def test_a_look_is_the_picture_of_its_step(driven: Driven) -> None:
 
 def test_it_is_drawn_otherwise_beside_the_run_which_goes_on(driven: Driven) -> None:
     before = driven.ask(Step(5))
-    wanted = Appearance("dark", activity=0.5, thickness=2.0)
-    driven.run.ask(Draw(Appearance("print")))
+    wanted = Appearance(activity=0.5, thickness=2.0)
+    driven.run.ask(Draw(Appearance(change=3.0)))
     driven.run.ask(Draw(wanted))
     assert driven.ask().status.appearance == wanted, "it is what is wanted as soon as it is asked for"
     after = driven.until(lambda shown: shown.view.appearance == wanted)
     assert after.glance.step == before.glance.step
-    assert after.view.plan.theme.background != before.view.plan.theme.background
     assert np.abs(after.glance.discs[0] - before.glance.discs[0] / 2) <= 1
     widths = before.glance.widths > FINENESS
     assert widths.any()
@@ -243,19 +242,19 @@ def test_it_is_drawn_otherwise_beside_the_run_which_goes_on(driven: Driven) -> N
 
 def test_a_picture_that_cannot_be_drawn_is_refused_and_the_next_one_is_drawn() -> None:
     def otherwise(appearance: Appearance) -> View:
-        if appearance.theme == "dark":
+        if appearance.pathways:
             raise ValueError("an engine has failed")
         return VIEW.otherwise(appearance)
 
     driven = Driven(SimulatedSource(COMPILED.simulator()), replace(VIEW, otherwise=otherwise))
     try:
-        driven.run.ask(Draw(Appearance("dark")), driven.refused.append)
+        driven.run.ask(Draw(Appearance(pathways=True)), driven.refused.append)
         shown = driven.until(lambda shown: shown.status.appearance == Appearance())
         assert driven.refused == ["the picture cannot be drawn so: an engine has failed"]
         assert shown.view.appearance == Appearance(), "what is shown stays"
-        driven.run.ask(Draw(Appearance("dark")), driven.refused.append)
-        driven.run.ask(Draw(Appearance("print")), driven.refused.append)
-        driven.until(lambda shown: shown.view.appearance == Appearance("print"))
+        driven.run.ask(Draw(Appearance(pathways=True)), driven.refused.append)
+        driven.run.ask(Draw(Appearance(change=2.0)), driven.refused.append)
+        driven.until(lambda shown: shown.view.appearance == Appearance(change=2.0))
         assert len(driven.refused) == 1, "by then it is not wanted any more"
     finally:
         driven.run.end()

@@ -14,7 +14,7 @@ import struct
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import aiohttp
@@ -30,11 +30,13 @@ from neurovis_spec.live.commands import REQUESTS, Appearance, Pause, Seek
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import AHEAD, Hub
 from neurovis_spec.live.live import listen
-from neurovis_spec.live.protocol import FRAME, LARGEST, MESSAGES, SCENE, TRACE
-from neurovis_spec.live.run import Run
+from neurovis_spec.live.protocol import FILE, FRAME, LARGEST, MESSAGES, SCENE, TRACE
+from neurovis_spec.live.run import Run, Stage
 from neurovis_spec.live.server import BURST, MOST_CLIENTS, MOST_CONNECTIONS, Server
 from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.source import Source
 from neurovis_spec.live.view import View, view_of
+from neurovis_spec.themes import THEMES
 
 COMPILED = nv.compile_text("""neurovis: 1
 name: live
@@ -120,6 +122,7 @@ class Eyes:
         self.step = -1
         self.serial = 0
         self.bytes = 0
+        self.saved = ""
         #: items (connections, then neurons) with the least and the largest value of each bin
         self.traces: dict[int, np.ndarray[Any, Any]] = {}
 
@@ -139,6 +142,9 @@ class Eyes:
             lines, discs = self.scene["lines"], self.scene["discs"]
             self.widths, self.kinds = np.zeros(lines, np.uint16), np.zeros(lines + discs, np.uint8)
             return SCENE
+        if data[0] == FILE:
+            self.saved = data[4 + struct.unpack_from("<H", data, 2)[0] :].decode()
+            return FILE
         if data[0] == TRACE:
             _, _, count, _, _, bins = struct.unpack_from("<BxHIdII", data)
             items, names = np.frombuffer(data, "<u4", 2 * count, 24).reshape(2, count)
@@ -405,6 +411,51 @@ def test_a_viewer_looks_on_and_can_ask_for_nothing() -> None:
     served(test)
 
 
+def test_each_sees_the_picture_in_a_theme_of_their_own() -> None:
+    """Frames are the same for all; a saved picture has the theme of who saves it; what cannot be drawn stays."""
+    asked = []
+
+    def dress(theme: str) -> View:
+        asked.append(theme)
+        if theme == "print":
+            raise ValueError("an engine has failed")
+        return VIEW.dress(theme)
+
+    async def test(live: Live) -> None:
+        def change(source: Source) -> Stage:
+            return source, replace(VIEW, dress=dress)
+
+        live.run.change(change)
+        async with live.stream(live.access.owner) as stream, live.stream(live.access.viewer) as other:
+            owner, viewer = Eyes(stream), Eyes(other)
+            await owner.until(lambda: owner.step > 2)
+            scene = owner.scene
+            for wants in ({"name": "", "dark": True}, {"name": "dark", "dark": False}):
+                await viewer.ask("theme", **wants)
+                await viewer.until(lambda: viewer.scene.get("theme", {}).get("name") == "dark")
+            assert viewer.scene["groups"] != scene["groups"]
+            assert [group["id"] for group in viewer.scene["groups"]] == [group["id"] for group in scene["groups"]]
+            await owner.ask("pause")
+            await owner.until(lambda: not owner.status["playing"])
+            await viewer.until(lambda: viewer.step == owner.step)
+            assert owner.scene == scene
+            assert viewer.kinds.tolist() == owner.kinds.tolist()
+            assert viewer.discs.tolist() == owner.discs.tolist()
+            await owner.ask("theme", name="dark", dark=False)
+            await owner.until(lambda: bool(owner.scene == viewer.scene))
+            assert asked == ["dark"], "it is made once for all"
+            await owner.ask("fetch", what="svg", seconds=1)
+            await owner.until(lambda: owner.saved != "")
+            assert THEMES["dark"].background in owner.saved
+            await owner.ask("theme", name="print", dark=False)
+            await owner.until(lambda: bool(owner.scene == scene))
+            await owner.ask("theme", name="", dark=False)
+            await owner.ask("step", by=1)
+            await owner.until(lambda: owner.step == viewer.step + 1)
+
+    served(test)
+
+
 def test_an_owner_puts_neurons_by_hand_and_everybody_is_told() -> None:
     async def test(live: Live) -> None:
         async with live.stream(live.access.owner) as stream, live.stream(live.access.viewer) as other:
@@ -438,7 +489,7 @@ def test_an_owner_puts_neurons_by_hand_and_everybody_is_told() -> None:
     served(test)
 
 
-DRAW = {"type": "draw", "theme": "", "activity": 1, "signal": 1, "thickness": 1, "change": 1}
+DRAW = {"type": "draw", "activity": 1, "signal": 1, "thickness": 1, "change": 1}
 #: What no page of ours sends: no JSON, of another shape, out of range.
 BROKEN: list[str | bytes] = [
     *("", "x", "{", "[]", "null", "1", "{}", '{"type": 1}', '{"type": "eval"}', '{"type": ["play"]}', "[" * 5000),
@@ -452,9 +503,10 @@ BROKEN: list[str | bytes] = [
     *(json.dumps({"type": "lesion", "part": "x" * 5000}), '{"type": "learn", "connections": "A -> B", "on": 1}'),
     *('{"type": "look", "items": "n1"}', '{"type": "look", "items": ["x1"]}', '{"type": "look", "items": ["n1", 2]}'),
     *(json.dumps({"type": "look", "items": ["n1"] * 65}), '{"type": "look", "items": ["n-1"]}'),
-    *(json.dumps(DRAW | {"theme": "x"}), json.dumps(DRAW | {"signal": 0}), json.dumps(DRAW | {"change": 65})),
-    *(json.dumps(DRAW | {"activity": True}), '{"type": "draw", "theme": ""}', json.dumps(DRAW | {"theme": None})),
-    json.dumps(DRAW | {"pathways": 1}),
+    *('{"type": "theme", "name": "x", "dark": true}', '{"type": "theme", "name": "dark"}'),
+    *('{"type": "theme", "name": null, "dark": true}', '{"type": "theme", "name": "", "dark": 1}'),
+    *(json.dumps(DRAW | {"theme": "dark"}), json.dumps(DRAW | {"signal": 0}), json.dumps(DRAW | {"change": 65})),
+    *(json.dumps(DRAW | {"activity": True}), '{"type": "draw"}', json.dumps(DRAW | {"pathways": 1})),
     *('{"type": "set", "values": {"pull": 1}, "moving": 1}', '{"type": "lesion", "part": "B", "moving": true}'),
     *(
         json.dumps({"type": "trace", "items": ["n1"], "first": 0, "every": 1, "bins": 9} | wrong)

@@ -183,7 +183,7 @@ def test_what_its_author_has_placed_stays_there(tmp_path: Path) -> None:
 
 def test_a_live_page_shows_them_when_it_is_asked_to() -> None:
     compiled = nv.compile_text(SPEC)
-    asked = {"theme": "", "activity": 2, "signal": 1, "thickness": 1, "change": 1, "pathways": True}
+    asked = {"activity": 2, "signal": 1, "thickness": 1, "change": 1, "pathways": True}
     command = command_of(json.dumps({"type": "draw", **asked}))
     assert isinstance(command, Draw)
     plain = Show().view(compiled)

@@ -20,10 +20,9 @@ MOST = 64.0
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """The name of a theme ('': that of the spec), how many times as large the gains of Eqs. 2–5 are, and whether each
-    group is drawn as one glyph, with the pathways between them."""
+    """How many times as large the gains of Eqs. 2–5 are, and whether each group is drawn as one glyph, with the
+    pathways between them."""
 
-    theme: str = ""
     activity: float = 1.0
     signal: float = 1.0
     thickness: float = 1.0
@@ -174,10 +173,11 @@ class Write:
 
 @dataclass(frozen=True, slots=True)
 class Fetch:
-    """Have the picture, a film of the last ``seconds``, or the recording."""
+    """Have the picture, a film of the last ``seconds``, or the recording; pictures in a ``theme``, "" for their own."""
 
     what: What
     seconds: float
+    theme: str = ""
 
 
 Request: TypeAlias = PlaceNeuron | Unplace | Save | Write | Fetch

@@ -153,7 +153,7 @@ class Desk:
 
     def _fetch(self, request: Fetch) -> bytes:
         """A file of what was shown."""
-        view, name = self._shown(), self._placed.compiled.name
+        view, name = self._shown().dressed(request.theme), self._placed.compiled.name
         network = self._placed.compiled.network
         steps = {"svg": 1, "npz": steps_for(network, None)}.get(request.what, steps_for(network, request.seconds))
         found: SimpleQueue[Told | str] = SimpleQueue()

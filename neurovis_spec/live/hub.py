@@ -10,18 +10,19 @@ desk; what is refused is told.
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.live.commands import Measure, Request
+from neurovis_spec.live.commands import Fetch, Measure, Request
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.held import told_of
 from neurovis_spec.live.history import Bins, History
@@ -30,6 +31,7 @@ from neurovis_spec.live.protocol import (
     TRACE,
     Connections,
     LookAt,
+    Themed,
     Trace,
     acknowledged,
     body_message,
@@ -47,6 +49,11 @@ from neurovis_spec.live.protocol import (
 from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.source import NOTHING, Drawn
 from neurovis_spec.live.typed import findings
+from neurovis_spec.live.view import View
+
+_LOG: Final = logging.getLogger(__name__)
+#: Nothing is wanted.
+AS_IT_IS: Final = Themed("", dark=False)
 
 #: Frames that a client may be sent before it has drawn them.
 AHEAD: Final = 2
@@ -63,8 +70,11 @@ class Client:
     """Somebody who looks on, and who as the owner may ask for something."""
 
     owner: bool
-    #: the version of the scene, the serial of the frame and the status that were sent last
+    #: the theme that it wants
+    wants: Themed = AS_IT_IS
+    #: the version and the theme of the scene, the serial of the frame and the status that were sent last
     version: int = 0
+    theme: str = ""
     sent: int = 0
     status: str = ""
     #: the body that it was told of
@@ -113,6 +123,8 @@ class Hub:
         self._holding: deque[Client] = deque()
         self._looking = False
         self._statuses: dict[bool, str] = {}
+        #: the scenes of the current version by their themes: None while one is made
+        self._scenes: dict[str, bytes | None] = {}
         #: what those who come later are told, too, by its type
         self._kept: dict[str, str] = {}
 
@@ -256,10 +268,15 @@ class Hub:
         shown = self._shown
         if shown is None:
             return
-        if client.version != self._version:
-            client.version, client.sent = self._version, 0
-            client.ahead.clear()
-            yield scene_message(shown.view.content, self._version)
+        theme = self.theme_of(client)
+        if (client.version, client.theme) != (self._version, theme):
+            scene = self._scene(shown.view, theme)
+            if scene is not None:
+                client.version, client.theme, client.sent = self._version, theme, 0
+                client.ahead.clear()
+                yield scene_message(scene, self._version)
+            elif client.version != self._version:
+                return
         status = self._statuses[client.owner]
         if client.status != status:
             client.status = status
@@ -279,6 +296,38 @@ class Hub:
             traces, client.traces = client.traces, ()
             yield from traces
 
+    def dress(self, client: Client, wants: Themed) -> None:
+        """A client wants its picture in a theme."""
+        client.wants = wants
+        client.wake.set()
+
+    def theme_of(self, client: Client) -> str:
+        """The theme that a client sees, "" for that of the view."""
+        name, view = client.wants.name, None if self._shown is None else self._shown.view
+        if not name and client.wants.dark and not (view is None or view.themed):
+            name = "dark"
+        return name
+
+    def _scene(self, view: View, theme: str) -> bytes | None:
+        """The scene of a view in a theme; None where it is still to be made, beside the loop, for all who want it."""
+        if not theme:
+            return view.content
+        if theme not in self._scenes:
+            self._scenes[theme] = None
+
+            def made(found: asyncio.Future[View]) -> None:
+                if found.cancelled() or self._shown is None or self._shown.view is not view:
+                    return
+                failed = found.exception()
+                if failed is not None:
+                    _LOG.error("the picture cannot be drawn in the theme %s", theme, exc_info=failed)
+                self._scenes[theme] = view.content if failed is not None else found.result().content
+                for client in self._clients:
+                    client.wake.set()
+
+            self._loop.run_in_executor(None, view.dressed, theme).add_done_callback(made)
+        return self._scenes[theme]
+
     def _take(self) -> None:
         self._scheduled = False
         shown, before = self._slot, self._shown
@@ -287,6 +336,7 @@ class Hub:
         self._serial += 1
         if before is None or shown.view is not before.view:
             self._version = self._version % 0xFFFF + 1
+            self._scenes = {}
             self._changed_at = np.full(len(shown.glance.kinds), self._serial, np.int64)
         else:
             self._changed_at[_changed(before, shown)] = self._serial
@@ -359,6 +409,8 @@ class Reception:
             self._hub.trace(client, command)
         elif isinstance(command, Connections):
             self._hub.hold(client, command.of)
+        elif isinstance(command, Themed):
+            self._hub.dress(client, command)
         elif not client.owner:
             client.tell(refused_message("this page only looks on"))
         elif isinstance(command, Measure) and shown is not None:
@@ -369,6 +421,8 @@ class Reception:
         elif not isinstance(command, Request):
             self._run.ask(command, lambda reason: self._hub.refuse(client, reason))
         elif self._desk is not None:
+            if isinstance(command, Fetch):
+                command = replace(command, theme=self._hub.theme_of(client))
             self._desk.ask(command, lambda text: self._hub.answer(client, text))
         else:
             client.tell(refused_message("nothing is put by hand or saved here"))

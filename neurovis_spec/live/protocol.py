@@ -277,6 +277,15 @@ class LookAt:
 
 
 @dataclass(frozen=True, slots=True)
+class Themed:
+    """The client wants the picture in the theme of this name, "": as it is, and where nobody asks for a theme dark if
+    its system is ``dark``; it is nobody else's business, so viewers may ask for it."""
+
+    name: str
+    dark: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Trace:
     """The client wants to be sent once how some items went, in bins of steps, and the ``rasters`` of the groups of some
     neurons; viewers may ask for it, too."""
@@ -294,7 +303,7 @@ class Connections:
 
 
 #: What is nobody else's business, so that viewers may ask for it.
-Wish: TypeAlias = LookAt | Trace | Connections
+Wish: TypeAlias = LookAt | Themed | Trace | Connections
 
 
 def acknowledged(data: bytes) -> Acknowledged:
@@ -380,8 +389,8 @@ def _factor(value: object) -> float:
     return number
 
 
-def _draw(theme: str, pathways: bool = False, **gains: float) -> Draw:
-    return Draw(Appearance(theme, **gains, pathways=pathways))
+def _draw(pathways: bool = False, **gains: float) -> Draw:
+    return Draw(Appearance(**gains, pathways=pathways))
 
 
 def _values(value: object) -> Mapping[str, float]:
@@ -464,7 +473,8 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "restart": ({}, Restart),
     "branch": ({}, Branch),
     "switch": ({"number": _whole(0, _MOST)}, Switch),
-    "draw": ({"theme": _theme, **dict.fromkeys(_GAINS, _factor), "pathways": _truth}, _draw),
+    "theme": ({"name": _theme, "dark": _truth}, Themed),
+    "draw": ({**dict.fromkeys(_GAINS, _factor), "pathways": _truth}, _draw),
     "speed": ({"value": _speed}, Speed),
     "measure": ({"text": _measure_text}, Measure),
     "unmeasure": ({"number": _whole(0, _MOST)}, Unmeasure),

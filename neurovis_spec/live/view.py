@@ -92,6 +92,9 @@ class View:
     appearance: Appearance
     #: the same network, drawn otherwise
     otherwise: Callable[[Appearance], View]
+    #: whether the spec, or who shows it, asks for its theme; the same picture in the theme of another name
+    themed: bool
+    dress: Callable[[str], View]
     #: what can be asked for by a name, and the names of what is drawn
     quantities: Quantities
     listed: Listed
@@ -102,6 +105,10 @@ class View:
     #: what stays of a picture of the same network in which more changes, at least so wide (page units)
     planned: Callable[[Network, float], tuple[Gathered, Plan]]
 
+    def dressed(self, theme: str) -> View:
+        """The same picture in a theme of ours, "": in its own."""
+        return self if not theme or self.plan.theme == THEMES[theme] else self.dress(theme)
+
     def glance(self, seen: Seen) -> Glance:
         """What a step looks like."""
         whole, drawn = seen.snapshot, self.drawn
@@ -110,7 +117,7 @@ class View:
         shown = looks(drawn.network, snapshot, self.gains, self.plan.frame.widest, drawn.signals(whole), ends)
         words = self.plan.caption_shape(caption(drawn.whole, whole.step, whole.activity))
         neurons, lines = self.lesioned(seen)
-        headless = self.plan.theme_ends(ends) <= 0  # a bar, or nothing, which is a bar of what is not negative
+        headless = ends <= 0  # a bar, or nothing, which is a bar of what is not negative
         of_lines = headless * BAR + lines * FAINT + (ends < 0) * NEGATIVE + self._shares(snapshot.weights) * _SHARE
         clamped, undefined = self._all(seen.clamped), ~np.isfinite(snapshot.told)
         of_neurons = neurons * FAINT + clamped * CLAMPED + undefined * UNDEFINED
@@ -245,7 +252,7 @@ def view_of(
     is how it was drawn with these gains and another title. Raises LayoutRefusalError, RendererError."""
     layout = compiled.placed(engine) if layout is None else layout
     network = in_direction(compiled.network, layout)
-    settings = replace(compiled.settings_for(appearance.theme or theme), pathways=appearance.pathways)
+    settings = replace(compiled.settings_for(theme), pathways=appearance.pathways)
     drawn = gathered(network, settings.collapse, settings.pathways)
     seen = appearance.gains(gains)
     stands = laid_out(drawn, layout)
@@ -256,7 +263,8 @@ def view_of(
     for scale in seen.thickness_scales:
         largest[seen.on_thickness(scale)] = scale.shown(scale.reaches or 1.0)
     frame = planned.frame
-    kinds = {"isBar": BAR, "isFaint": FAINT, "isNegative": NEGATIVE, "isClamped": CLAMPED, "isUndefined": UNDEFINED}
+    bar = BAR if planned.theme.ends == "signs" else 0  # a theme may know nothing but arrows
+    kinds = {"isBar": bar, "isFaint": FAINT, "isNegative": NEGATIVE, "isClamped": CLAMPED, "isUndefined": UNDEFINED}
     # of a picture in which something is collapsed nothing can be put elsewhere
     where = {"scale": 0.0 if drawn.any else frame.scale, "left": frame.left, "top": frame.top}
     constants = {"levels": LEVELS, "fineness": FINENESS, "shares": SHARES, "share": _SHARE, **kinds, **where}
@@ -278,9 +286,22 @@ def view_of(
     more = {**declared(compiled), **ranges_of(drawn), **names, **begins, "themes": list(THEMES), "themed": themed}
     words = content(drawn.network, scene, rows, constants, more)
     otherwise = otherwise or partial(view_of, compiled, gains, theme, engine, layout=layout)
+    dress = partial(_dressed, compiled, gains, appearance, layout, otherwise)
     anew = partial(_planned, stands, seen, settings)
+    how = appearance, otherwise, themed, dress
     names_of = quantities, listed, curves, beside
-    return View(drawn, seen, planned, largest, stands, words, appearance, otherwise, *names_of, anew)
+    return View(drawn, seen, planned, largest, stands, words, *how, *names_of, anew)
+
+
+def _dressed(
+    compiled: Compilation,
+    gains: Gains,
+    appearance: Appearance,
+    layout: Layout,
+    otherwise: Callable[[Appearance], View],
+    theme: str,
+) -> View:
+    return view_of(compiled, gains, theme, appearance=appearance, layout=layout, otherwise=otherwise)
 
 
 def _planned(

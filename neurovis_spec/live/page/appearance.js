@@ -1,11 +1,13 @@
 /**
- * Appearance: the theme, how many times as large the gains are, and whether groups are drawn as one glyph each.
+ * Appearance: a viewer's own theme; and for all how many times as large the gains are, and whether each group is drawn as one node.
  */
 
+import { keep, recall } from './memory.js';
 import { Sliders } from './sliders.js';
 
 /** @typedef {import('./protocol.js').Gains} Gains */
 /** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Scene} Scene */
 
 /** What is coloured, or drawn thicker. @type {Object<string, string>} */
 const GAINS = {
@@ -15,12 +17,14 @@ const GAINS = {
   change: 'glow where weights change',
 };
 
+/** By what the theme that was chosen is kept. */
+const THEME = 'theme';
+
 /** What is drawn otherwise than the spec says: in words, and what takes it back. @param {Gains} shown
  * @returns {{words: string, back: object}[]} */
 export function drawnOtherwise(shown) {
-  const { theme, pathways, ...gains } = shown;
+  const { pathways, ...gains } = shown;
   return [
-    ...(theme ? [{ words: `theme ${theme}`, back: { ...shown, theme: '' } }] : []),
     ...(pathways ? [{ words: 'pathways', back: { ...shown, pathways: false } }] : []),
     ...Object.entries(gains)
       .filter(([, value]) => value !== 1)
@@ -36,20 +40,20 @@ export class Appearance {
     this.pathways = pathways;
     pathways.onclick = () => this.toggle();
     /** @type {Gains} */
-    this.shown = { theme: '', activity: 1, signal: 1, thickness: 1, change: 1, pathways: false };
-    /** whether the system says if it is to be dark: nobody else does */
-    this.isFree = false;
-    /** whether it is dark because this page has asked for it */
-    this.isFollowed = false;
+    this.shown = { activity: 1, signal: 1, thickness: 1, change: 1, pathways: false };
+    this.link = link;
+    /** the theme that was chosen here, '' for none */
+    this.chosen = recall(THEME) || '';
     this.owner = false;
     this.isDark = matchMedia('(prefers-color-scheme: dark)');
     const ask = (/** @type {object} */ more) => link.ask('draw', { ...this.shown, ...more });
     this.ask = ask;
     theme.onchange = () => {
-      this.isFree = false;
-      ask({ theme: theme.value });
+      this.chosen = theme.value;
+      keep(THEME, this.chosen);
+      this.dress();
     };
-    this.isDark.onchange = () => this.follow();
+    this.isDark.onchange = () => this.dress();
     this.sliders = new Sliders(place);
     for (const [name, description] of Object.entries(GAINS)) {
       this.sliders.add({ name, value: 1, low: 1 / 64, high: 64, description, log: true }, `gain-${name}`, (value) =>
@@ -58,37 +62,35 @@ export class Appearance {
     }
   }
 
-  /** @param {string[]} names @param {boolean} themed whether a theme is asked for */
-  use(names, themed) {
-    if (this.theme.length === 0) this.isFree = !themed;
-    this.follow();
-    if (this.theme.length === names.length + 1) return;
-    this.theme.replaceChildren(...['', ...names].map((name) => new Option(name || 'of the spec', name)));
-    this.theme.value = this.shown.theme;
+  /** Ask for the picture in the theme that was chosen, or as dark as the system where nobody asks for one. */
+  dress() {
+    this.link.ask('theme', { name: this.chosen, dark: this.isDark.matches });
   }
 
-  /** Be dark where the system is, unless somebody has chosen a theme. */
-  follow() {
-    const { matches } = this.isDark;
-    if (!this.isFree || !this.owner || matches === this.isFollowed || this.shown.theme !== (matches ? '' : 'dark'))
-      return;
-    this.isFollowed = matches;
-    this.ask({ theme: matches ? 'dark' : '' });
+  /** Whether another scene, in a theme that was asked for, takes the place of this one at once. @param {Scene} scene */
+  awaits({ theme, themed }) {
+    const wanted = this.chosen || (this.isDark.matches && !themed ? 'dark' : '');
+    return wanted !== '' && theme.name !== wanted;
+  }
+
+  /** Another network. @param {string[]} names */
+  use(names) {
+    if (this.theme.length !== names.length + 1)
+      this.theme.replaceChildren(...['', ...names].map((name) => new Option(name || 'of the spec', name)));
+    this.theme.value = this.chosen;
   }
 
   /** @param {Gains} shown @param {boolean} owner */
   show(shown, owner) {
     this.shown = shown;
     this.owner = owner;
-    this.follow();
-    const { theme, pathways, ...gains } = shown;
-    this.theme.value = theme;
+    const { pathways, ...gains } = shown;
     this.pathways.setAttribute('aria-pressed', String(pathways));
     this.pathways.disabled = !owner;
     this.sliders.show(gains);
   }
 
-  /** Draw each group as one glyph, or each neuron again. */
+  /** Draw each group as one node, or each neuron again. */
   toggle() {
     if (this.owner) this.ask({ pathways: !this.shown.pathways });
   }

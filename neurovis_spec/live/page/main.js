@@ -46,6 +46,8 @@ let marks = null;
 let matrix = null;
 let fresh = false,
   asked = false,
+  // whether a first scene may still be one in another theme than was asked for
+  isBefore = true,
   density = 0;
 
 /** Draw before the display's next frame. */
@@ -118,6 +120,10 @@ function resize() {
 const link = new Link({
   scene(scene) {
     const first = !zoom.scene;
+    if (first && isBefore && turning.appearance.awaits(scene)) {
+      isBefore = false;
+      return;
+    }
     pointer.cancel();
     zoom.use(scene);
     drawing = null;
@@ -190,8 +196,10 @@ const link = new Link({
   },
   link(open) {
     part('lost').hidden = open;
-    if (open) attention.ask();
-    else controls.refuse('not connected, trying again …');
+    if (open) {
+      turning.appearance.dress();
+      attention.ask();
+    } else controls.refuse('not connected, trying again …');
   },
 });
 const controls = new Controls(link);

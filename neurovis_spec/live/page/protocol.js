@@ -10,7 +10,7 @@ import { isStill } from './camera.js';
  *   onDisc: boolean, upward: boolean, columns: number, rows: number, pixels: string}} Shape */
 /** @typedef {{id: string, data: Object<string, string>, title: string, shapes: Shape[]}} Group */
 /** @typedef {Object<string, string>} Theme */
-/** @typedef {{theme: string, activity: number, signal: number, thickness: number, change: number, pathways: boolean}} Gains */
+/** @typedef {{activity: number, signal: number, thickness: number, change: number, pathways: boolean}} Gains */
 /** @typedef {{name: string, value: number, low: number | null, high: number | null, description: string, unit?: string}} Declared */
 /** A turn: of which members it has, `type` decides.
  * @typedef {{step: number, type: string, name: string, neurons: string, part: string, connections: string, on: boolean,

@@ -77,8 +77,8 @@ export class Turning {
   }
 
   /** Another network. @param {Scene} scene */
-  use({ parameters, inputs, rules, themes, themed }) {
-    this.appearance.use(themes, themed);
+  use({ parameters, inputs, rules, themes }) {
+    this.appearance.use(themes);
     const shown = JSON.stringify([parameters, inputs, rules]);
     if (shown === this.shown) return;
     this.shown = shown;
