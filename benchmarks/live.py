@@ -14,6 +14,9 @@ drawn. Bytes are those of all messages. The run's delay is how late each of its 
 them, with nobody looking on, one, and a hundred, one of them stalled; the clients are in a process of their own, draw
 nothing and acknowledge every frame, but for the one that never does. What the machine does besides shows in the row
 without clients.
+
+A start is the time of the processor that "neurovis live" takes until it prints its URL: where nobody has laid out the
+network before, and where its layout is in the user's cache. An edit of the title is that until a page has it.
 """
 
 from __future__ import annotations
@@ -24,13 +27,15 @@ import gzip
 import json
 import multiprocessing
 import os
+import re
+import shutil
 import statistics
 import struct
 import sys
 import tempfile
 import time
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.synchronize import Event
 from pathlib import Path
@@ -48,6 +53,7 @@ from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.view import FINENESS, View, view_of
+from neurovis_spec.user_cache import ENVIRONMENT_VARIABLE
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "tests"))
@@ -67,6 +73,8 @@ connections:
   R -> R: {{weight: "normal(0, {deviation})", pattern: {{random: {{probability: {probability}}}}}}}
 render: {{min_weight: 0}}
 """
+#: Of these it is measured how long it takes until the page is there.
+STARTS = (HERE.parent / "specs/walk/walk.yaml", HERE.parent / "specs/hexapod/hexapod.yaml")
 _USE_CASE = HERE.parent / "specs" / "cpg_rbf.yaml"
 #: Notes when frames are drawn, which the page says, and when the display asks for the next one.
 _NOTES = """
@@ -277,6 +285,56 @@ async def delays(compiled: nv.CompiledNetwork, view: View, count: int, seconds: 
     return late
 
 
+# --- how long it takes until a page is there
+
+
+async def starts(spec: Path) -> list[float]:
+    """Seconds of the processor until ``neurovis live --watch`` prints its URL, with a layout that nobody has made
+    before and with one that is known, and those that an edit of the title takes; of a copy of an example with a folder
+    of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(shutil.copytree(spec.parent, Path(folder) / spec.stem)) / spec.name
+        environment = {**os.environ, "XDG_CACHE_HOME": folder, ENVIRONMENT_VARIABLE: ""}
+        command = (sys.executable, "-m", "neurovis_spec", "live", str(copy), "--watch", "--no-body")
+        found: list[float] = []
+        for again in (False, True):
+            process = await asyncio.create_subprocess_exec(
+                *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL, env=environment
+            )
+            assert process.stdout is not None
+            url = (await process.stdout.readline()).decode().strip()
+            found.append(processor_time(process.pid))
+            if again:
+                found.append(await edited(process.pid, url, copy))
+            process.terminate()
+            await process.wait()
+        return found
+
+
+async def edited(pid: int, url: str, spec: Path) -> float:
+    """Seconds of the processor from an edit of the title until a page has it, while the run stands still."""
+    async with aiohttp.ClientSession() as session, session.ws_connect(url.replace("/?", "/live?")) as stream:
+        await stream.send_str('{"type": "pause"}')
+
+        async def quiet() -> None:
+            with suppress(TimeoutError):
+                while await stream.receive(1.0):
+                    pass
+
+        await quiet()
+        before = processor_time(pid)
+        text = spec.read_text(encoding="utf-8")
+        spec.write_text(re.sub(r"^title:.*$", "title: Another", text, count=1, flags=re.MULTILINE), encoding="utf-8")
+        await quiet()
+        return processor_time(pid) - before
+
+
+def processor_time(pid: int) -> float:
+    """Seconds of the processor that a process has had."""
+    fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 # --- all of it
 
 
@@ -332,6 +390,13 @@ def main() -> None:
         for size in sizes:
             asyncio.run(measure(size, rounds, seconds, peers, asked.shots))
         print()
+    heads = ["start", "first, s of the processor", "layout known", "title edited", "load"]
+    print(f"| {' | '.join(heads)} |\n|{' --- |' * len(heads)}")
+    for spec in STARTS:
+        rows = [asyncio.run(starts(spec)) for _ in range(rounds)]
+        values = " | ".join(f"{statistics.median(column):.2f}" for column in zip(*rows, strict=True))
+        print(f"| {spec.stem} | {values} | {os.getloadavg()[0]:.1f} |", flush=True)
+    print()
     heads = ["clients", "steps", "late by, median ms", "p95", "p99", "load"]
     print(f"| {' | '.join(heads)} |\n|{' --- |' * len(heads)}")
     compiled = network(12, 28)

@@ -27,6 +27,7 @@ from neurovis_spec.cli.options import (
     start_option,
     theme_option,
 )
+from neurovis_spec.cli.progress import progress
 
 if TYPE_CHECKING:
     import socket
@@ -173,7 +174,8 @@ def _show(network: CompiledNetwork, show: Show, in_place: Written | None, edited
     from neurovis_spec.live.desk import Desk
     from neurovis_spec.live.live import Edits, serve
 
-    stage = show.stage(network)
+    with progress("laying out"):
+        stage = show.stage(network)
     sock = bound(door.host, door.port)
     access = Access(door.host, sock.getsockname()[1], door.viewers)
 
