@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from neurovis_spec.live.protocol import command_of, status_message
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Reach, SourceError
-from neurovis_spec.live.turns import Lesion, Set
+from neurovis_spec.live.turns import Hold, Learn, Lesion, Mend, Set, Turn, Weigh
 from neurovis_spec.live.view import view_of
 
 COMPILED = nv.compile_text(
@@ -58,6 +59,32 @@ def everything(source: SimulatedSource) -> list[object]:
     found.append((source.turned, known(source).tolist().__repr__()))
     source.go(here)
     return found
+
+
+def shapes(futures: Sequence[Future]) -> Sequence[object]:
+    """Where futures are, but for their numbers."""
+    return sorted([one.at, one.last, len(one.turned), repr(shapes(one.within))] for one in futures)
+
+
+def test_what_is_taken_back_later_is_the_opposite_from_there_on_and_earlier_has_not_been() -> None:
+    source = at(30)
+    source.turn(Lesion("A1"))
+    source.advance()
+    first = source.turned[0].number
+    source.take_back(first)
+    assert [(entry.step, entry.turn) for entry in source.turned] == [(30, Lesion("A1")), (31, Mend("A1"))]
+    source.turn(Set({"pull": 0.4}))
+    second = source.turned[-1].number
+    for _ in range(5):
+        source.advance()
+    source.go(20)
+    source.take_back(second)
+    assert (source.step, [(one.at, one.last) for one in source.futures.all]) == (31, [(31, 36)])
+    source.go(10)
+    source.take_back(first)
+    assert (source.step, source.turned, source.reach.last) == (30, (), 30)
+    with pytest.raises(SourceError, match="no part of this branch"):
+        source.take_back(first)
 
 
 def test_what_was_is_kept_when_something_is_turned_in_the_past_and_can_be_gone_to() -> None:
@@ -145,20 +172,25 @@ def test_nothing_is_kept_where_nothing_came_after_and_none_is_gone_to_that_there
 
 @given(
     st.lists(
-        st.tuples(st.sampled_from(["go", "turn", "on", "switch", "restart", "branch"]), st.integers(0, 60)), max_size=14
-    )
+        st.tuples(st.sampled_from(["go", "turn", "undo", "on", "switch", "restart", "branch"]), st.integers(0, 60)),
+        max_size=14,
+    ),
+    st.sampled_from([Hold("A2", 0.3), Lesion("A1"), Weigh("A1 -> B", 0.2), Learn("A -> B", False), Set({"pull": 0.7})]),
 )
 @settings(max_examples=40, deadline=None)
-def test_every_future_is_as_it_was_left(acts: list[tuple[str, int]]) -> None:
+def test_every_future_is_as_it_was_left_and_what_is_undone_leaves_none(acts: list[tuple[str, int]], what: Turn) -> None:
     source, left = at(40), dict[int, list[object]]()
     for act, number in acts:
         made, now = source.futures.made, None
-        if act in ("turn", "branch", "restart", "switch"):
+        if act in ("turn", "undo", "branch", "restart", "switch"):
             now = everything(source)
         if act == "go":
             source.go(min(number, source.reach.last))
         elif act == "turn":
-            source.turn(Set({"pull": number / 60}))
+            source.turn(Weigh("A1 -> B", number / 60) if number % 3 == 0 else Set({"pull": number / 60}))
+        elif act == "undo":
+            if source.turned:
+                source.take_back(source.turned[number % len(source.turned)].number)
         elif act == "on":
             for _ in range(number // 3):
                 source.advance()
@@ -173,6 +205,12 @@ def test_every_future_is_as_it_was_left(acts: list[tuple[str, int]]) -> None:
         if now is not None and source.futures.made > made:
             left[made] = now
     assert {future.number for future in source.futures.all} <= set(left)
+    if any(type(entry.turn) is type(what) and entry.step == source.step for entry in source.turned):
+        return  # of two values at one step the last is the turn
+    before = everything(source), shapes(source.futures.all)
+    source.turn(what)
+    source.take_back(max(entry.number for entry in source.turned))
+    assert (everything(source), shapes(source.futures.all)) == before
 
 
 def seen_at(source: SimulatedSource, step: int) -> object:

@@ -381,7 +381,7 @@ Doing = tuple[str, int] | Turn
 
 def doings(kind: Kind) -> st.SearchStrategy[list[Doing]]:
     """Sequences of what can be done."""
-    often, seldom = ["advance", "back", "go", "go", "recall"], ["event", "branch", "restart", "edit"]
+    often, seldom = ["advance", "back", "go", "go", "recall"], ["event", "branch", "restart", "edit", "undo"]
     moves, others = (st.tuples(st.sampled_from(names), st.integers(0, 12)) for names in (often, seldom))
     begun: Doing = ("advance", 9)
     return st.lists(st.one_of(moves, kind.turns(), moves, kind.turns(), others), max_size=14).map(
@@ -423,6 +423,13 @@ def do(source: SimulatedSource, model: Model, doing: Doing) -> SimulatedSource:
             model.forget(source.step)
         case (name, calls) if name.startswith("fail "):
             cast(Fragile, source._simulation).fails = name.removeprefix("fail "), calls
+        case ("undo", which):
+            if source._turned:
+                number = source._turned[which % len(source._turned)].number
+                with suppress(SourceError):
+                    source.take_back(number)
+                model.forget(-1)
+                model.turns = [(entry.step, entry.turn) for entry in source._turned]
         case ("restart", _):
             source.restart()
             model.forget(-1)
@@ -465,8 +472,8 @@ def test_what_raises_on_the_way_changes_nothing(name: str, data: st.DataObject) 
 
 
 #: All of a Source that a run asks.
-METHODS = ("advance", "go", "restart", "recall", "branch", "turn", "seen", "after", "number_after", "step", "reach",
-           "turned", "parameters", "fed", "learning", "history", "capabilities")  # fmt: skip
+METHODS = ("advance", "go", "restart", "recall", "branch", "turn", "seen", "after", "number_after", "step",
+           "reach", "turned", "parameters", "fed", "learning", "history", "capabilities")  # fmt: skip
 
 
 class Broken:

@@ -101,6 +101,13 @@ class Switch:
 
 
 @dataclass(frozen=True, slots=True)
+class Undo:
+    """Take a turn back, by its number."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
 class Speed:
     """How fast it plays; infinity is as fast as can be."""
 
@@ -133,9 +140,8 @@ class Draw:
     appearance: Appearance
 
 
-Command: TypeAlias = (
-    Present | Draw | Play | Pause | Step | Seek | Event | Restart | Branch | Switch | Speed | Measure | Unmeasure | Turn
-)
+Showing: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Restart | Branch | Switch | Undo | Speed
+Command: TypeAlias = Showing | Measure | Unmeasure | Turn
 
 
 #: Where what was put by hand is written: into ``layout.positions`` of the spec, or into the layout file that the spec

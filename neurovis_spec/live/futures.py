@@ -61,6 +61,16 @@ class Futures:
         rest = (*(one for one in self.all if one.at <= left.at), made)
         return Futures(rest, self.made + 1)
 
+    def left_at(self, at: int, turned: Sequence[Turned]) -> Future | None:
+        """The one that was left last behind a step until which it was ``turned`` in this way."""
+        numbers = [entry.number for entry in turned]
+        found = [
+            one
+            for one in self.all
+            if one.at == at and [entry.number for entry in one.turned if entry.step <= at] == numbers
+        ]
+        return max(found, key=lambda one: one.number, default=None)
+
     def bounded(self, room: int = ROOM) -> Futures:
         """Without the oldest, where they are too many or take too much room."""
         return replace(self, all=_bounded(self.all, room))

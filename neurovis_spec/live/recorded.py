@@ -192,6 +192,10 @@ class RecordedSource:
         """Raises SourceError: there is no other future."""
         raise SourceError("a recording has no other future: run the spec")
 
+    def take_back(self, number: int) -> None:
+        """Raises SourceError: nothing was turned."""
+        raise SourceError("a recording cannot be changed: run the spec")
+
     def turn(self, turn: Turn) -> None:
         """Raises SourceError: a recording stays as it is."""
         raise SourceError("a recording cannot be changed: run the spec")

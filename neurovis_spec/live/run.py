@@ -36,6 +36,7 @@ from neurovis_spec.live.commands import (
     Speed,
     Step,
     Switch,
+    Undo,
     Unmeasure,
 )
 from neurovis_spec.live.curves import series_of
@@ -274,6 +275,9 @@ class Run:
                 source.switch(asked.number)
                 self._target, self._ended = None, False
                 self._clock.start(now)
+            case Undo():
+                source.take_back(asked.number)
+                self._ended = False
             case Draw():
                 self.appearance = asked.appearance
                 self._redraw(refuse)

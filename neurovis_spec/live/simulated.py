@@ -59,7 +59,7 @@ class SimulatedSource:
     """A network that runs; it stands at the first step to be computed: step 0, or that of ``begin``, a state in which
     ``turned`` has had its effect and inputs are ``fed``. ``origin`` is where it begins anew."""
 
-    capabilities = Capabilities(TURNS | {"branch", "switch"})
+    capabilities = Capabilities(TURNS | {"branch", "switch", "undo"})
 
     def __init__(
         self,
@@ -295,15 +295,12 @@ class SimulatedSource:
         # what has all its states needs none of those before them
         if self.reach.first <= at or (at >= 0 and not future.kept):
             self.go(min(self.step, at))
-        others = self._left(at).without(future.number)
+        others = self._left(at)
         if at < 0:
             self._begin(self._origin, (), {})
         self.futures = others
         self._past.cut(at)
-        for kept in future.kept:
-            self._past.keep(kept)
-        self.history.go_on(future.history)
-        self._turned, self._last, self._listed = list(future.turned), future.last, ([], ())
+        self._go_on(future)
         self._started = future.started
         self._make_up_to(max(self._first_seen, min(step, self._last)), again=True)
 
@@ -331,6 +328,51 @@ class SimulatedSource:
                 self._seen = self._turned_seen()
         if refused:
             raise SourceError(refused)
+
+    def take_back(self, number: int) -> None:
+        """Take a turn back, by its number: at the step at which it was taken, or before that, as though it had not
+        been, with what came after it without it; later by its opposite. Raises SourceError."""
+        entry = next((entry for entry in without_drags(self._turned) if entry.number == number), None)
+        if entry is None:
+            raise SourceError("what was turned is no part of this branch")
+        is_later = entry.since is not None or entry.step < self.step or self._past.before(entry.step) is None
+        if is_later and entry.back is not None:
+            self.turn(entry.back)
+            return
+        self._check_going()
+        with self._whole():
+            self._past, self.history = self._past.copy(), self.history.copy()
+            if self.step != entry.step:
+                self._make_up_to(entry.step, again=True)
+            self._unturn(entry)
+
+    def _unturn(self, one: Turned) -> None:
+        """Be at the current step as though a turn had not been taken here."""
+        step, before = self.step, self.futures
+        rest = [entry for entry in self._turned if entry.step <= step and entry.number != one.number]
+        self.futures = self._left(step).bounded()
+        self._past.cut(step)
+        self.history.cut(step)
+        self._turned, self._last, self._listed = rest, step, ([], ())
+        self._make_up_to(step, again=True)
+        here = [entry.turn for entry in rest if entry.step == step]
+        for what in here:
+            self._turn(what)
+        if here:
+            self._keep(self._kept())
+            self._seen = self._turned_seen()
+        without = before.left_at(step, rest)
+        if without is not None and self.futures.path(without.number):
+            self._go_on(without)
+
+    def _go_on(self, future: Future) -> None:
+        """Have the states, the turns and the history of a future follow those of the run until where it branched
+        off."""
+        self.futures = self.futures.without(future.number)
+        for kept in future.kept:
+            self._past.keep(kept)
+        self.history.go_on(future.history)
+        self._turned, self._last, self._listed = list(future.turned), future.last, ([], ())
 
     def _opposite(self, what: Turn) -> Turn:
         """What takes a turn back that is about to be taken."""

@@ -41,9 +41,9 @@ class Reach:
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What kind of source it is. ``takes``: the names of the turns that it accepts, ``branch`` and ``switch`` if it
-    accepts these; ``ends``: there is a last step; ``arrives``: its steps are received from elsewhere, so it is advanced
-    once a frame, not by dt, and waits at the newest."""
+    """What kind of source it is. ``takes``: the names of the turns that it accepts, ``branch``, ``switch`` and
+    ``undo`` if it accepts these; ``ends``: there is a last step; ``arrives``: its steps are received from elsewhere, so
+    it is advanced once a frame, not by dt, and waits at the newest."""
 
     takes: frozenset[str] = frozenset()
     ends: bool = False
@@ -178,6 +178,11 @@ class Source(Protocol):
 
     def turn(self, turn: Turn) -> None:
         """Apply a turn; what came after the current step is another future. Raises SourceError."""
+        ...
+
+    def take_back(self, number: int) -> None:
+        """Take a turn back, by its number: at the step at which it was taken as though it had not been, later by its
+        opposite. Raises SourceError."""
         ...
 
     def switch(self, number: int) -> None:

@@ -314,6 +314,10 @@ class ReceivedSource:
         """Raises SourceError: there is no other future."""
         raise SourceError("what arrives goes on by itself")
 
+    def take_back(self, number: int) -> None:
+        """Raises SourceError: what has arrived stays as it is; the opposite of a turn is another turn."""
+        raise SourceError("what arrives goes on by itself")
+
     def turn(self, turn: Turn) -> None:
         """Take a turn, from the network's next step on. Raises SourceError, also where the network takes none."""
         if self._steering is None:

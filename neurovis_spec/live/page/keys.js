@@ -58,7 +58,7 @@ const GROUPS = [
   ],
   [
     'holding',
-    [']', '[', 'Escape', 'p', '/', 'o'],
+    [']', '[', 'Escape', 'p', 'c', '/', 'o'],
     [
       ['click, tap', 'hold a neuron or a connection'],
       ['click beside', 'let go'],
@@ -67,7 +67,7 @@ const GROUPS = [
   ['views', ['m', 'g', 'y'], []],
   [
     'changing',
-    ['t', 'shift+←', 'shift+→', 'shift+↑', 'shift+↓', 'z'],
+    ['t', 'shift+←', 'shift+→', 'shift+↑', 'shift+↓', 'z', 'ctrl+z', 'ctrl+shift+z'],
     [
       ['drag a neuron', 'put it elsewhere (with a finger: hold it first)'],
       ['shift and drag up, down', 'clamp a neuron to a value'],

@@ -27,7 +27,8 @@ import { say } from './say.js';
 import { Scrubber } from './scrubber.js';
 import { withNumber } from './sliders.js';
 import { Strips } from './strips.js';
-import { Turning } from './turning.js';
+import { Turning, told } from './turning.js';
+import { Undo } from './undo.js';
 import { Zoom } from './zoom.js';
 
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('picture'));
@@ -177,6 +178,7 @@ const link = new Link({
       controls.status(message);
       scrubber.status(message);
       turning.status(message);
+      undo.status(message);
       placing.status(message);
       strips.owner = message.owner;
       strips.measures(message.measures);
@@ -191,6 +193,7 @@ const link = new Link({
     } else if (message.type === 'measured') measuring.take(message);
     else if (message.type === 'refused') {
       refusal.tell(message.reason);
+      undo.refused();
       if (placing.waiting) placing.cancel();
     }
   },
@@ -204,6 +207,7 @@ const link = new Link({
 });
 const controls = new Controls(link);
 const turning = new Turning(link, part);
+const undo = new Undo(link, part, told);
 const refusal = new Refusal(part('refusal'));
 const attention = new Attention(link, zoom, redraw, (group) => {
   if (!attention.all) zoom.more([]);
@@ -321,7 +325,13 @@ part('png').onclick = () => {
 for (const what of ['svg', 'npz']) part(what).onclick = () => link.ask('fetch', { what, seconds: 1 });
 part('film').onclick = () => withNumber(part('seconds'), (seconds) => link.ask('fetch', { what: 'film', seconds }));
 part('help').onclick = help;
-part('matrix').onclick = () => choose(!matrix);
+const views = { toggle: () => choose(!matrix) };
+part('matrix').onclick = () => views.toggle();
+undo.follow(views, 'the matrix of the weights');
+undo.follow(turning, 'the panel for turning');
+undo.follow(outline, 'the outline');
+undo.follow(body, 'the panel of the body');
+undo.followPins(strips);
 part('shut').onclick = help;
 arrangePanels();
 greet(part('hint'));
@@ -344,7 +354,7 @@ Object.assign(controls.keys, {
   v: ['say what is held with its value, or how the run stands', tellAll],
   t: ['open or close the panel of parameters', () => turning.toggle()],
   y: ['open or close the panel of the body', () => body.toggle()],
-  m: ['the matrix of the weights in place of the picture, and back', () => choose(!matrix)],
+  m: ['the matrix of the weights in place of the picture, and back', () => views.toggle()],
   g: ['each group as one node, with the pathways between them, and back', () => turning.appearance.toggle()],
   c: ['add a curve by its name, or by a measure', () => measuring.toggle()],
   p: ['pin the curve of what is held, or unpin it', () => strips.toggle()],
@@ -364,5 +374,7 @@ Object.assign(controls.keys, {
   'shift+↑': ['put it further up', () => placing.step(attention.held, 0, -1)],
   'shift+↓': ['put it further down', () => placing.step(attention.held, 0, 1)],
   z: ['undo the last placing', () => placing.undo()],
+  'ctrl+z': ['undo what was done last', () => undo.back()],
+  'ctrl+shift+z': ['do again what was undone, as ctrl+y does', () => undo.again()],
   '?': ['list keys and gestures, or close the list', help],
 });

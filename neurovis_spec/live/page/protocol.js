@@ -203,6 +203,8 @@ export class Link {
     this.takes = new Set();
     /** @type {WebSocket | Handed | null} */
     this.socket = null;
+    /** called with what is asked @type {(type: string, more?: object) => void} */
+    this.asked = () => {};
     this.wait = 250;
     this.work = Promise.resolve();
     /** when the last frame was taken over */
@@ -283,7 +285,9 @@ export class Link {
 
   /** Ask for something. @param {string} type @param {object} [more] */
   ask(type, more) {
-    if (this.socket && this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ type, ...more }));
+    if (!this.socket || this.socket.readyState !== WebSocket.OPEN) return;
+    this.asked(type, more);
+    this.socket.send(JSON.stringify({ type, ...more }));
   }
 
   /** Say that the latest frame has been drawn. */

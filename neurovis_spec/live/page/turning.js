@@ -18,7 +18,7 @@ import { Weight } from './weight.js';
 /** @typedef {import('./protocol.js').Turned} Turned */
 
 /** A turn in words. @param {Turned} turn @returns {string} */
-function told(turn) {
+export function told(turn) {
   const pairs = (/** @type {object} */ values) =>
     Object.entries(values)
       .map(([name, value]) => `${name} = ${value}`)
@@ -162,7 +162,11 @@ export class Turning {
     };
     const rows = [
       ...drawnOtherwise(appearance).map(({ words, back }) => row(words, () => ({ type: 'draw', ...back }))),
-      ...turned.map((entry) => row(`step ${entry.step + 1}: ${told(entry)}`, () => entry.back ?? { type: '' })),
+      ...turned.map((entry) =>
+        row(`step ${entry.step + 1}: ${told(entry)}`, () =>
+          this.link.takes.has('undo') || !entry.back ? { type: 'undo', number: entry.number } : entry.back,
+        ),
+      ),
     ];
     list.replaceChildren(...rows.reverse());
     if (focused) (list.querySelector('button') || this.find('copy')).focus();
