@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from test_live_browser import pause, shown
 from test_live_looking import TIP, places, told
 from test_live_server import Eyes, Live, served
@@ -20,6 +22,8 @@ from test_scene_bundles import LAYERS
 
 import neurovis_spec as nv
 from neurovis_spec.live.held import told_of
+from neurovis_spec.live.joined import joined
+from neurovis_spec.live.sums import Sums
 from neurovis_spec.live.view import View, view_of
 
 #: The second layer in a box; what a picture draws of 90 connections is a part.
@@ -121,6 +125,62 @@ def test_of_very_many_the_strongest_by_the_weights_of_now_are_drawn_and_all_coun
     assert found["inputs"] + found["outputs"] + found["within"] == 90
 
 
+@given(data=st.data())
+def test_bundles_add_up_what_lines_do_now_and_how_many_are_lesioned(data: st.DataObject) -> None:
+    seen = view(BOXED)
+    some = list(seen.plan.left.values())
+    numbers = st.lists(st.integers(-3, 3), min_size=90, max_size=90)
+    weights = np.array(data.draw(numbers), float)
+    ends = np.sign(data.draw(numbers)).astype(np.int8)
+    lost = np.array(data.draw(numbers)) > 1
+    found = Sums.of(some, seen.drawn.counts).at(weights, ends, lost)
+    for one, row in zip(some, found.tolist(), strict=True):
+        own = one.members.tolist()
+        sums = [sum(weights[i] for i in own if ends[i] == end) for end in (1, -1, 0)]
+        counts = [sum(ends[i] == end for i in own) for end in (1, -1, 0)]
+        assert row == [*sums, *counts, sum(lost[i] for i in own)]
+
+
+NESTED = """
+neurovis: 1
+name: nested
+modules:
+  leg: {neurons: {A: {count: 2}, B: {count: 3, box: inner}}, connections: {A -> B: {pattern: all_to_all, weight: 1}}}
+neurons: {O: {count: 2}, P: {}}
+instances: {left: {module: leg}, right: {module: leg}}
+connections:
+  left.B -> O: {pattern: all_to_all, weight: -2}
+  O -> right.A: {pattern: all_to_all, weight: 0.5}
+  left.A -> right.B: {pattern: all_to_all, weight: 3}
+  O -> P: {pattern: all_to_all, weight: 1}
+"""
+
+
+@pytest.mark.parametrize(
+    "boxes", [["instance:left"], ["instance:right", "instance:left", "no:body"], ["box:left.inner"]]
+)
+def test_what_runs_from_and_to_closed_boxes_is_added_up(boxes: list[str]) -> None:
+    seen = view(NESTED)
+    ends = seen.drawn.network.connections
+    weights = ends.weights.whole()
+    found = joined(seen, boxes)
+    rows = found.sums.at(weights, np.sign(weights).astype(np.int8), np.zeros(len(ends), bool))
+    known = [box for box in boxes if box in seen.plan.boxes]
+    assert known
+    assert found.boxes == tuple(known)
+
+    def unit(neuron: int) -> str:
+        return next((box for box in known if neuron in seen.plan.boxes[box]), f"n{neuron}")
+
+    wanted: dict[tuple[str, str], list[float]] = {}
+    for a, b, weight in zip(ends.sources.tolist(), ends.targets.tolist(), weights.tolist(), strict=True):
+        pair = unit(a), unit(b)
+        if pair[0] != pair[1] and {*pair} & {*known}:
+            wanted.setdefault(pair, []).append(weight)
+    told = {pair: (row[:2].sum(), row[3:6].sum()) for pair, row in zip(found.ends, rows, strict=True)}
+    assert told == {pair: (sum(some), len(some)) for pair, some in wanted.items()}
+
+
 @pytest.mark.parametrize("owner", [True, False])
 def test_whoever_asks_is_told_and_who_asks_again_is_told_of_that(owner: bool) -> None:
     async def test(live: Live) -> None:
@@ -196,13 +256,14 @@ def test_what_is_held_is_drawn_listed_and_counted_with_the_weights_of_now(tmp_pa
             await opened.ask("Object.assign(document.querySelector('#search'), {value: 'B → A'}).oninput()")
             await opened.until(f"{rows}[0]?.startsWith('B → A ·')")
             await opened.key("Enter")
-            await opened.until(f"{TIP}.textContent.startsWith('B → A ·')")
+            left = seen.plan.left["bundle:B -> A"].members
+            await opened.until(f"{TIP}.textContent.startsWith('B → A · {len(left)} connections, sum ')")
+            words = str(await opened.ask(f"{TIP}.textContent")).split("\n")[0]
+            total = weights[left].sum()
+            assert abs(total - network.connections.weights[left].sum()) > 0.01, "they have learned"
+            assert float(words.split("sum ")[1].replace("−", "-")) == pytest.approx(total, rel=1e-3)
             await opened.ask("Object.assign(document.querySelector('#search'), {value: ''}).oninput()")
-            left = sum(
-                names[ends.sources[i]][0] == "B" and names[ends.targets[i]][0] == "A" and i not in lines
-                for i in range(len(ends))
-            )
-            await opened.until(f"{rows}.filter((row) => /^B\\d+ → A/.test(row)).length == {left}")
+            await opened.until(f"{rows}.filter((row) => /^B\\d+ → A/.test(row)).length == {len(left)}")
             await opened.key("Escape")
             await opened.ask("document.querySelector('#picture').focus()")
             await opened.key("Escape")

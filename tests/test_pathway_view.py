@@ -129,6 +129,16 @@ def test_the_sentences_are_of_the_steps_that_are_shown(tmp_path: Path) -> None:
     assert described(ET.parse(tmp_path / "x.svg").getroot()) == []
 
 
+def test_what_is_lesioned_by_then_is_counted_and_told(tmp_path: Path) -> None:
+    spec = SPEC + "events: [{at: 2, lesion: [E1, E2 -> I1]}]\n"
+    whole = "E excites I: 8 connections, sum 4, delay 0.5 ms"
+    assert nv.compile_text(spec).pathways()[2] == whole
+    assert whole in described(picture(tmp_path, spec, step=1))
+    root = picture(tmp_path, spec, step=2)
+    assert whole.replace("connections,", "connections (3 lesioned),") in described(root)
+    assert "8 · Σ 4 · 3 lesioned" in written(root)
+
+
 def test_other_views_beside_it_show_all_neurons_and_collapsed_instances_are_one(tmp_path: Path) -> None:
     root = picture(tmp_path, view=["pathways", "matrix"])
     assert len(parts(root, "cell")) == 8 + 8 + 4 + 4

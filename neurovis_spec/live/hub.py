@@ -26,9 +26,12 @@ from neurovis_spec.live.commands import Fetch, Measure, Request
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.held import told_of
 from neurovis_spec.live.history import Bins, History
+from neurovis_spec.live.joined import Joined, joined
 from neurovis_spec.live.protocol import (
+    ADDED,
     LEFT,
     TRACE,
+    Close,
     Connections,
     LookAt,
     Themed,
@@ -38,16 +41,19 @@ from neurovis_spec.live.protocol import (
     command_of,
     frame_message,
     held_message,
+    joined_message,
     measured_message,
     raster_message,
     refused_message,
     scene_message,
     status_message,
+    sums_message,
     trace_message,
     values_message,
 )
 from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.source import NOTHING, Drawn
+from neurovis_spec.live.sums import SumArray
 from neurovis_spec.live.typed import findings
 from neurovis_spec.live.view import View
 
@@ -89,6 +95,10 @@ class Client:
     traces: tuple[bytes, ...] = ()
     #: what it holds, of which it is to be told all connections
     held: str = ""
+    #: the boxes that it has closed, and what runs there of the scene of which version
+    closed: tuple[str, ...] = ()
+    joined: Joined | None = None
+    added: SumArray | None = None
     texts: deque[str | bytes] = field(default_factory=lambda: deque(maxlen=_TEXTS))
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -111,6 +121,8 @@ class Hub:
         self._version, self._serial = 0, 0
         #: for each item (connections, then neurons) the serial of the frame in which it last changed
         self._changed_at: npt.NDArray[np.int64] = np.zeros(0, np.int64)
+        #: the same of bundles
+        self._summed_at: npt.NDArray[np.int64] = np.zeros(0, np.int64)
         self._frames: dict[int, bytes] = {}
         #: when viewers are sent the next frame, and what will do so where there is one
         self._next = 0.0
@@ -232,6 +244,25 @@ class Hub:
         if not self._looking:
             self._look_up()
 
+    def close(self, client: Client, boxes: tuple[str, ...]) -> None:
+        """A client has closed these boxes alone."""
+        shown = self._shown
+        if shown is None or boxes == client.closed:
+            return
+        client.closed, client.joined = boxes, joined(shown.view, boxes) if boxes else None
+        if client.joined is not None:
+            client.added = None
+            client.tell(joined_message(client.joined.content, self._version))
+            for message in self._added(client, client.joined, shown):
+                client.tell(message)
+
+    def _added(self, client: Client, joined: Joined, shown: Shown) -> Iterator[bytes]:
+        """What runs from and to the boxes that a client has closed adds up to, where that has changed."""
+        sums = shown.view.added(shown.seen, joined.sums)
+        if client.added is None or not np.array_equal(sums, client.added, equal_nan=True):
+            client.added = sums
+            yield sums_message(sums, self._version, np.arange(len(sums)), ADDED)
+
     def _look_up(self) -> None:
         """Look up connections for whoever has waited longest, beside the loop, as of many it takes a while."""
         client, shown = self._holding.popleft(), self._shown
@@ -274,6 +305,7 @@ class Hub:
             if scene is not None:
                 client.version, client.theme, client.sent = self._version, theme, 0
                 client.ahead.clear()
+                client.closed, client.joined = (), None
                 yield scene_message(scene, self._version)
             elif client.version != self._version:
                 return
@@ -287,6 +319,11 @@ class Hub:
         if client.sent < self._serial and len(client.ahead) < AHEAD:
             since, client.sent = client.sent, self._serial
             client.ahead.append(self._serial)
+            summed = np.flatnonzero(self._summed_at > since)
+            if len(summed):
+                yield sums_message(shown.glance.sums, self._version, summed)
+            if client.joined is not None:
+                yield from self._added(client, client.joined, shown)
             yield self._frame(since)
             client.asked = bool(client.items)
         if client.asked:
@@ -338,8 +375,11 @@ class Hub:
             self._version = self._version % 0xFFFF + 1
             self._scenes = {}
             self._changed_at = np.full(len(shown.glance.kinds), self._serial, np.int64)
+            self._summed_at = np.full(len(shown.glance.sums), self._serial, np.int64)
         else:
             self._changed_at[_changed(before, shown)] = self._serial
+            one, other = before.glance.sums, shown.glance.sums
+            self._summed_at[((one != other) & ~(np.isnan(one) & np.isnan(other))).any(axis=1)] = self._serial
         if before is None or before.status != shown.status or not self._statuses:
             self._statuses = {owner: status_message(shown.status, owner, self._takes) for owner in (True, False)}
         self._shown = shown
@@ -407,6 +447,8 @@ class Reception:
             self._hub.check(client, command.items)
         elif isinstance(command, Trace):
             self._hub.trace(client, command)
+        elif isinstance(command, Close):
+            self._hub.close(client, command.boxes)
         elif isinstance(command, Connections):
             self._hub.hold(client, command.of)
         elif isinstance(command, Themed):

@@ -55,15 +55,18 @@ from neurovis_spec.live.history import Bins, Range
 from neurovis_spec.live.run import Status
 from neurovis_spec.live.saving import MOST_SECONDS
 from neurovis_spec.live.source import Drawn, Reach
+from neurovis_spec.live.sums import SumArray
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh
 from neurovis_spec.live.typed import LONGEST
 from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
-SCENE, FRAME, TRACE, FILE, RASTER, LEFT, HELD = 1, 2, 3, 4, 5, 6, 7
+SCENE, FRAME, TRACE, FILE, RASTER, LEFT, HELD, SUMS, JOINED, ADDED = range(1, 11)
 #: kind, scene
 _SCENE_HEAD = struct.Struct("<BxH")
+#: kind, scene, how many bundles
+_SUMS_HEAD = struct.Struct("<BxHI")
 #: kind, scene, serial, changed, step, first, last, bytes of the caption, numbers of the pose
 _HEAD = struct.Struct("<BxHIIdddHH")
 #: The most numbers of a pose; of a body with more there is no picture.
@@ -105,6 +108,17 @@ class ProtocolError(ValueError):
 def scene_message(content: bytes, version: int) -> bytes:
     """The scene with its version, which frames name."""
     return _SCENE_HEAD.pack(SCENE, version) + content
+
+
+def joined_message(content: bytes, version: int) -> bytes:
+    """What runs from and to the boxes that a client has closed, in a scene of this version."""
+    return _SCENE_HEAD.pack(JOINED, version) + content
+
+
+def sums_message(sums: SumArray, version: int, changed: npt.NDArray[np.int64], kind: int = SUMS) -> bytes:
+    """What bundles add up to, those that have ``changed``, or of the ``kind`` ADDED what closed boxes join."""
+    rows = np.ascontiguousarray(sums[changed], "<f4")
+    return _SUMS_HEAD.pack(kind, version, len(changed)) + changed.astype("<u4").tobytes() + rows.tobytes()
 
 
 def held_message(content: bytes, version: int) -> bytes:
@@ -303,8 +317,15 @@ class Connections:
     of: str
 
 
+@dataclass(frozen=True, slots=True)
+class Close:
+    """The client has closed these boxes, and wants what runs from and to them added up; viewers may ask for it, too."""
+
+    boxes: tuple[str, ...]
+
+
 #: What is nobody else's business, so that viewers may ask for it.
-Wish: TypeAlias = LookAt | Themed | Trace | Connections
+Wish: TypeAlias = LookAt | Themed | Trace | Connections | Close
 
 
 def acknowledged(data: bytes) -> Acknowledged:
@@ -453,6 +474,12 @@ def _held(value: object) -> str:
     return value
 
 
+def _boxes(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list) or len(value) > _MANY:
+        raise ProtocolError(f"at most {_MANY} ids of boxes are wanted")
+    return tuple(_held(box) for box in value)
+
+
 _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command | Request | Wish]]]] = {
     "look": ({"items": _items}, LookAt),
     "trace": (
@@ -466,6 +493,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
         _trace,
     ),
     "connections": ({"of": _held}, Connections),
+    "close": ({"boxes": _boxes}, Close),
     "play": ({}, Play),
     "pause": ({}, Pause),
     "step": ({"by": _whole(-_NEAR, _NEAR)}, Step),

@@ -28,10 +28,11 @@ from neurovis_spec.live.declared import declared, words_of
 from neurovis_spec.live.drawing import Moved, content, moved
 from neurovis_spec.live.history import Members
 from neurovis_spec.live.source import Mask, Seen
+from neurovis_spec.live.sums import ENDS, SumArray, Sums
 from neurovis_spec.live.weights import ranges_of
 from neurovis_spec.runtime.quantities import Glyphs, Listed, Quantities
 from neurovis_spec.runtime.recording import Snapshot
-from neurovis_spec.scene import Scene
+from neurovis_spec.scene import Scene, bundles
 from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.collapse import Gathered, gathered
 from neurovis_spec.scene.encode import looks, paint, tooltips
@@ -39,6 +40,7 @@ from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gathered_layout import laid_out
 from neurovis_spec.scene.matrix import order_of
 from neurovis_spec.scene.pathway_words import told
+from neurovis_spec.scene.pathways import Pathway
 from neurovis_spec.scene.plan import Plan, plan, retitled
 from neurovis_spec.themes import THEMES
 
@@ -65,7 +67,8 @@ class Glance:
     (m + n,): of each connection, then of each neuron, BAR where its line ends in a bar, or, where it is not NEGATIVE,
     in nothing, FAINT where it is lesioned, of a line NEGATIVE where its weight is, or its synapse says so, and in the
     higher bits how large the weight is; of a neuron CLAMPED where it is, and
-    UNDEFINED where its activity is no finite number. ``pose`` is that of the body, no numbers where there is none."""
+    UNDEFINED where its activity is no finite number. ``pose`` is that of the body, no numbers where there is none;
+    ``sums`` are those of bundles, but for single connections."""
 
     step: int
     caption: str
@@ -75,6 +78,7 @@ class Glance:
     glows: npt.NDArray[np.uint16]
     kinds: npt.NDArray[np.uint8]
     pose: npt.NDArray[np.float32]
+    sums: SumArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,6 +108,8 @@ class View:
     beside: Beside
     #: what stays of a picture of the same network in which more changes, at least so wide (page units)
     planned: Callable[[Network, float], tuple[Gathered, Plan]]
+    #: of the bundles that stand for several connections
+    sums: Sums
 
     def dressed(self, theme: str) -> View:
         """The same picture in a theme of ours, "": in its own."""
@@ -130,7 +136,14 @@ class View:
             glows=_parts(shown.glows),
             kinds=np.concatenate([of_lines, of_neurons]).astype(np.uint8),
             pose=np.zeros(0, np.float32) if whole.pose is None else _metres(whole.pose),
+            sums=self.sums.at(snapshot.weights, ends, lines),
         )
+
+    def added(self, seen: Seen, sums: Sums) -> SumArray:
+        """What some connections add up to at a step."""
+        weights = self.drawn.snapshot(seen.snapshot).weights
+        ends = self.drawn.ends(seen.snapshot.weights, seen.snapshot.ends)
+        return sums.at(weights, ends, self.lesioned(seen)[1])
 
     def _shares(self, weights: FloatArray) -> npt.NDArray[np.int64]:
         """How large weights are, as parts of the largest of their scale; none is 0 that is not."""
@@ -283,14 +296,17 @@ def view_of(
         "curves": [asdict(curve) for curve in curves.shown],
         "beside": told_beside,
     }
-    more = {**declared(compiled), **ranges_of(drawn), **names, **begins, "themes": list(THEMES), "themed": themed}
+    joined, bands = _bundles(planned)
+    by_hand = {**declared(compiled), **ranges_of(drawn)}
+    more = {**by_hand, **names, **begins, **bands, "themes": list(THEMES), "themed": themed}
     words = content(drawn.network, scene, rows, constants, more)
     otherwise = otherwise or partial(view_of, compiled, gains, theme, engine, layout=layout)
     dress = partial(_dressed, compiled, gains, appearance, layout, otherwise)
     anew = partial(_planned, stands, seen, settings)
     how = appearance, otherwise, themed, dress
     names_of = quantities, listed, curves, beside
-    return View(drawn, seen, planned, largest, stands, words, *how, *names_of, anew)
+    sums = Sums.of(joined, drawn.counts)
+    return View(drawn, seen, planned, largest, stands, words, *how, *names_of, anew, sums)
 
 
 def _dressed(
@@ -302,6 +318,18 @@ def _dressed(
     theme: str,
 ) -> View:
     return view_of(compiled, gains, theme, appearance=appearance, layout=layout, otherwise=otherwise)
+
+
+def _bundles(planned: Plan) -> tuple[list[Pathway], dict[str, object]]:
+    """The pathways whose sums a page is told, and what it must know of how bundles are drawn."""
+    network, left = planned.network, planned.left
+    lone = {name: int(one.members[0]) for name, one in left.items() if bundles.is_lone(network, one)}
+    joined = {name: one for name, one in left.items() if name not in lone}
+    widths = bundles.widths(list(left.values()), len(joined))
+    inks = [[bundles.ink(planned.theme, end, alone) for end in ENDS] for alone in (False, True)]
+    wide = {"widest": planned.unit * widths.widest, "narrowest": planned.unit * widths.narrowest, "most": widths.most}
+    told = {"joined": list(joined), "lone": lone, "inks": inks, **wide, "signs": planned.theme.ends == "signs"}
+    return list(joined.values()), {"bundles": told}
 
 
 def _planned(

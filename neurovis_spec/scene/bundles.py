@@ -156,18 +156,17 @@ def _finite(total: float) -> float:
 def _drawn(left: Sequence[Pathway], hubs: Mapping[int, Hub], ground: Ground) -> list[Bundle]:
     """The bundles, the widest first, so that none hides another."""
     lone = [is_lone(ground.network, one) for one in left]
-    widest, most = _WIDEST * min(1.0, (_CROWD / max(lone.count(False), 1)) ** 0.25), largest(left)
-    result = list[Bundle]()
+    widths_of, result = widths(left, lone.count(False)), list[Bundle]()
     for alone, usual in ((False, _USUAL), (True, float(ground.radii.min(initial=_USUAL)))):
         some = [one for one, by_itself in zip(left, lone, strict=True) if by_itself is alone]
-        widths = [[_THIN if alone else _width(strand, most, widest) for strand in one.strands] for one in some]
+        wide = [[_THIN if alone else widths_of.at(strand.total) for strand in one.strands] for one in some]
         routes = [
             _routes(hubs[one.source], hubs[one.target], own, 0.0 if alone else _BEND, ground.picture)
-            for one, own in zip(some, widths, strict=True)
+            for one, own in zip(some, wide, strict=True)
         ]
         rims = [_rims(hubs[one.source], hubs[one.target]) for one in some for _ in one.strands]
         lines = iter(trimmed([route for own in routes for route in own], np.array(rims).reshape(-1, 2), usual))
-        for one, own in zip(some, widths, strict=True):
+        for one, own in zip(some, wide, strict=True):
             bands = tuple(Band(strand, next(lines), width) for strand, width in zip(one.strands, own, strict=True))
             result.append(Bundle(one, bands, alone))
     return sorted(result, key=lambda one: -max(band.width for band in one.bands))
@@ -191,10 +190,23 @@ def _routes(a: Hub, b: Hub, widths: Sequence[float], bend: float, picture: Rect)
     return result
 
 
-def _width(strand: Strand, most: float, widest: float) -> float:
-    """As the root of the sum: a band that is twice as wide stands for four times as much."""
-    share = abs(_finite(strand.total)) / most if most > 0 else 0.0
-    return max(_NARROWEST, widest * math.sqrt(share))
+class Widths(NamedTuple):
+    """How wide bands are: as the roots of their sums, so that one that is twice as wide stands for four times as
+    much; that of the sum ``most`` is the ``widest``."""
+
+    widest: float
+    narrowest: float
+    most: float
+
+    def at(self, total: float) -> float:
+        """The width of a band with this sum."""
+        share = abs(_finite(total)) / self.most if self.most > 0 else 0.0
+        return max(self.narrowest, self.widest * math.sqrt(share))
+
+
+def widths(left: Sequence[Pathway], bundles: int) -> Widths:
+    """How wide the bands of these pathways are, of which so many are bundles."""
+    return Widths(_WIDEST * min(1.0, (_CROWD / max(bundles, 1)) ** 0.25), _NARROWEST, largest(left))
 
 
 def _rims(a: Hub, b: Hub) -> tuple[float, float]:

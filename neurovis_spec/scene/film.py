@@ -123,7 +123,8 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
     tips = tooltips(network, gains, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
     return Film(
         scene=replace(
-            paint(planned, first, glowing, captions[0], tips, steps[0]), told=told(drawn, low[1], high[1], ends)
+            paint(planned, first, glowing, captions[0], tips, steps[0]),
+            told=told(drawn, low[1], high[1], ends, steps[-1]),
         ),
         fps=fps,
         fills=tuple(f"n{index}" for index in range(len(network.neurons))),

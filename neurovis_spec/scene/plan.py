@@ -59,7 +59,7 @@ from neurovis_spec.scene.line_styles import Styles, styles_of
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Shape, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
-from neurovis_spec.scene.pathway_words import PathwayWords
+from neurovis_spec.scene.pathway_words import PathwayWords, lost_by
 from neurovis_spec.scene.pathways import Pathway, pathways
 from neurovis_spec.scene.scaling import scaled, scaled_group
 from neurovis_spec.scene.shown import Shown, shown
@@ -278,7 +278,7 @@ def _content(
     beside = [(index, reach) for index, reach in beside if index not in rooms]
     extent = _extent(positions, radii, routes, boxes, beside, rooms.values())
     lesions, signals, ends = lesions_of(network), Signals(drawn.whole).called, _ends(drawn)
-    words = PathwayWords(drawn.whole)
+    words = PathwayWords(drawn.whole, lost_by(drawn.whole, 0 if begin is None else begin.step))
     return _Content(
         network=network,
         positions=positions,

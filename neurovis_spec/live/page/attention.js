@@ -2,6 +2,7 @@
  * Attention: what is pointed at, and what is held; its values, and what stands out with it.
  */
 
+import { Bands } from './bands.js';
 import { isBeside } from './beside.js';
 import { halfway } from './marks.js';
 import { say } from './say.js';
@@ -68,6 +69,8 @@ export class Attention {
     this.groups = new Map();
     /** bundles and boxes @type {Map<string, Group>} */
     this.others = new Map();
+    /** @type {Bands | null} */
+    this.bands = null;
     /** what is told of all connections of what is held, and what is to be held as soon as it is told of
      * @type {Told | null} */
     this.all = null;
@@ -94,6 +97,7 @@ export class Attention {
       of = (/** @type {RegExp} */ kind) =>
         new Map(scene.groups.filter(({ id }) => kind.test(id)).map((group) => [group.id, group]));
     this.groups = of(ITEM);
+    this.bands = new Bands(scene);
     this.others = of(/^(box|instance|bundle):/);
     this.signals = scene.groups.filter(({ data }) => data.signal !== undefined);
     this.pointed = '';
@@ -238,7 +242,9 @@ export class Attention {
   /** The same without its connections. @param {string} id @param {Look} look @returns {string} */
   itself(id, look) {
     const group = this.groups.get(id) ?? this.unseen(id);
-    if (!group) return id.startsWith('bundle:') ? (this.others.get(id)?.title ?? '') : this.zoom.words(id, look);
+    const bundle = id.startsWith('bundle:') && this.others.get(id);
+    if (bundle) return this.bands?.words(bundle, look) ?? '';
+    if (!group) return this.zoom.words(id, look);
     const [name, ...more] = group.title.split('\n'),
       { neuron, delay, state } = group.data;
     const what = neuron === undefined ? 'weight' : (state ?? 'activity'),

@@ -2,10 +2,12 @@
  * Drawing: a scene and a look on a canvas, the same picture as the renderers make.
  */
 
+import { Bands } from './bands.js';
 import { channels, palette } from './colours.js';
 import { dashes, flattened, packed } from './coverage.js';
 import { enter, leave, Mosaic } from './mosaic.js';
 
+/** @typedef {import('./bands.js').Band} Band */
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./protocol.js').Shape} Shape */
 /** @typedef {import('./protocol.js').Group} Group */
@@ -22,7 +24,7 @@ import { enter, leave, Mosaic } from './mosaic.js';
  *   width: number, glow: number, ending: number, share: number}} LaidLine */
 /** What lies otherwise when another `points`, `head` or `at` is put in place of the one before.
  * @typedef {{id: string, index: number, points: number[], dash: number[], head: Shape, tail: Shape | null, rest: Shape[],
- *   laid: LaidLine | null}} Line */
+ *   band: Band | null, laid: LaidLine | null}} Line */
 /** @typedef {{id: string, index: number, shape: Shape, rest: Shape[], laid: (Round & {tiles: Tile[]}) | null}} Disc */
 
 /** What a line is drawn of: its points, its head, one at its other end if it leads both ways, and what lies on it.
@@ -81,8 +83,11 @@ export class Drawing {
     );
     /** @type {Group[]} */
     this.back = [];
-    /** what stands for many lines @type {Group[]} */
-    this.bundles = [];
+    /** what lies between lines and discs @type {Group[]} */
+    this.between = [];
+    this.bands = new Bands(scene);
+    /** whether lines have begun, and bands behind them are no more */
+    this.isBegun = false;
     /** @type {Group[]} */
     this.front = [];
     /** @type {Line[]} */
@@ -122,19 +127,25 @@ export class Drawing {
     if (data.neuron !== undefined) {
       this.discs.push({ id, index: Number(id.slice(1)), shape: shapes[0], rest: shapes.slice(1), laid: null });
     } else if (data.connection !== undefined) {
-      this.lines.push({ id, index: Number(id.slice(1)), ...parts(shapes), laid: null });
+      this.isBegun = true;
+      this.lines.push({ id, index: Number(id.slice(1)), ...parts(shapes), band: null, laid: null });
+    } else if (id.startsWith('bundle:')) {
+      for (const { band, shapes: own } of this.bands.of(group)) {
+        const { single } = band;
+        this.lines.push({ id: single < 0 ? id : `c${single}`, index: single, ...parts(own), band, laid: null });
+      }
     } else if (id === 'caption') {
       this.caption = shapes[0];
     } else {
-      const { front, bundles, back } = this;
-      (this.discs.length ? front : this.lines.length ? bundles : back).push(group);
+      const { front, between, back } = this;
+      (this.discs.length ? front : this.isBegun ? between : back).push(group);
     }
   }
 
   /** Take over that the shapes of a group have other places. @param {Group} group */
   reshape({ id, shapes }) {
     const group = this.scene.groups.find((one) => one.id === id),
-      line = this.lines.find((one) => one.id === id),
+      line = this.lines.find((one) => one.id === id && !one.band),
       disc = this.discs.find((one) => one.id === id);
     if (group) group.shapes = shapes;
     if (disc) [disc.shape, ...disc.rest] = shapes;
@@ -269,10 +280,10 @@ export class Drawing {
         }
       }),
       between:
-        beads.length || this.bundles.length
+        beads.length || this.between.length
           ? this.picture(camera, [], (context) => {
               draw(context, beads);
-              for (const { id, shapes } of this.bundles) {
+              for (const { id, shapes } of this.between) {
                 context.globalAlpha = !near.size || near.has(id) ? 1 : RECEDING;
                 for (const shape of shapes) this.shape(context, shape);
               }
@@ -333,12 +344,13 @@ export class Drawing {
     });
     lines.forEach((line, at) => {
       const { index, points, laid } = line,
-        kind = look.kinds[index],
-        share = shareOf(line.id, kind);
-      const width = look.widths[index],
-        glow = look.glows[index],
-        ending = !(kind & isBar) ? 1 : kind & isNegative ? -1 : 0;
-      mosaic.paint(at, fills[look.lines[index] + levels]);
+        band = line.band && this.bands.seen(line.band, look),
+        kind = band ? 0 : look.kinds[index];
+      const share = shareOf(line.id, kind) * (band ? band.share : 1),
+        width = band ? band.width : look.widths[index],
+        glow = band ? 0 : look.glows[index];
+      const ending = band ? band.ending : !(kind & isBar) ? 1 : kind & isNegative ? -1 : 0;
+      mosaic.paint(at, band ? band.colour : fills[look.lines[index] + levels]);
       const same = laid && laid.points === points && laid.head === line.head;
       if (same && laid.width === width && laid.glow === glow && laid.ending === ending && laid.share === share) return;
       const end = this.end(line.head, width / fineness, ending, scale, camera.origin);

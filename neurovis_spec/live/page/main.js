@@ -158,7 +158,7 @@ const link = new Link({
   },
   held(told) {
     if (!attention.tell(told)) return;
-    zoom.more(told.groups);
+    zoom.more(told.groups, told.of);
     placing.more(told.groups);
     outline.more(told.groups);
     outline.hold();
@@ -284,9 +284,8 @@ const placing = new Placing(
 );
 const pointer = new Pointer(canvas, camera, attention, placing, {
   pointed(x, y) {
-    const { look } = link;
     if (matrix) return matrix.under(camera, x, y);
-    return zoom.under(camera.unit(x, y)) || (drawing && look ? under(drawing, camera, look, x, y) : '');
+    return zoom.under(camera.unit(x, y)) || (drawing ? under(drawing, camera, x, y) : '');
   },
   pressed(id) {
     if (zoom.boxes.some((box) => box.id === id)) enter(id);

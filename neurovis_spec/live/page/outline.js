@@ -48,10 +48,11 @@ export class Outline {
 
   /** Another network. @param {Scene} scene */
   use(scene) {
+    const { lone } = scene.bundles;
     this.entries = [];
     for (const { id, title } of this.beside.groups.values())
       if ('is'.includes(id[0])) this.entries.push({ id, name: title, more: this.beside.kind(id) });
-    this.more(scene.groups);
+    this.more(scene.groups.map((group) => (group.id in lone ? { ...group, id: `c${lone[group.id]}` } : group)));
   }
 
   /** There is more to be listed. @param {Group[]} groups */
@@ -91,7 +92,8 @@ export class Outline {
 
   /** What is held is another: list what it is connected with. */
   hold() {
-    if (!this.field.value) this.fill();
+    const ids = (/** @type {Entry[]} */ entries) => entries.map(({ id }) => id).join();
+    if (!this.panel.hidden && !this.field.value && ids(this.first()) !== ids(this.all)) this.fill();
   }
 
   /** What is listed without a search: what is held with its inputs and outputs, else all. @returns {Entry[]} */

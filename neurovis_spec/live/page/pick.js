@@ -4,7 +4,6 @@
 
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {import('./draw.js').Drawing} Drawing */
-/** @typedef {import('./protocol.js').Look} Look */
 
 /** How far from a line, in pixels of a page, a pointer may be. */
 const NEAR = 5;
@@ -25,9 +24,9 @@ function distance({ at, parts }, x, y) {
 }
 
 /** The id of the neuron or the connection under a pixel, '' for none; neurons lie above connections, and what is drawn
- * there is before what is close by. @param {Drawing} drawing @param {Camera} camera @param {Look} look
+ * there is before what is close by. @param {Drawing} drawing @param {Camera} camera
  * @param {number} x @param {number} y @returns {string} */
-export function under(drawing, camera, look, x, y) {
+export function under(drawing, camera, x, y) {
   const [across, down] = camera.unit(x, y),
     near = (NEAR * devicePixelRatio) / camera.scale;
   for (const { id, shape } of drawing.discs.slice().reverse()) {
@@ -36,11 +35,11 @@ export function under(drawing, camera, look, x, y) {
   const { scale, origin } = drawing.seen;
   let found = '',
     least = near;
-  for (const { id, index, laid } of drawing.lines.slice().reverse()) {
-    const half = look.widths[index] / drawing.constants.fineness / 2,
+  for (const { id, laid } of drawing.lines.slice().reverse()) {
+    const half = (laid?.width ?? 0) / drawing.constants.fineness / 2,
       room = near + half;
     if (
-      !laid ||
+      !laid?.share ||
       across < laid.box[0] - room ||
       across > laid.box[2] + room ||
       down < laid.box[1] - room ||

@@ -2,6 +2,7 @@
  * The protocol: the connection to the server, and what its messages mean (docs/live.md).
  */
 
+import { NUMBERS } from './bands.js';
 import { isStill } from './camera.js';
 
 /** @typedef {{kind: string, at: number[], points: number[], size: number[], along: number[], colours: string[],
@@ -25,18 +26,22 @@ import { isStill } from './camera.js';
  *   ranges: [number | null, number | null, number][], ranged: number[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
  *   themed: boolean, named: string[][], names: number[], curves: Curve[], beside: {inputs: string[], sensors: string[], words: string[]}, order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
- *   told: string[], boxes: Object<string, number[]>, groups: Group[]}} Scene */
+ *   told: string[], boxes: Object<string, number[]>, bundles: Bundles, groups: Group[]}} Scene */
 /** Signals in one axis, by what they are asked for, the first in front, and their names.
  * @typedef {{items: string[], names: string[]}} Curve */
 /** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */
 /** All connections of what is held: how many come into it, leave it, stay within, and are not drawn even so; those lines
  * that the picture leaves out.
  * @typedef {{of: string, inputs: number, outputs: number, within: number, undrawn: number, groups: Group[]}} Told */
+/** The bundles that are added up, those of single connections and which these are, and how they are drawn: colours of what
+ * excites, inhibits and does neither, added up and single.
+ * @typedef {{joined: string[], lone: Object<string, number>, inks: string[][], widest: number, narrowest: number, most: number,
+ *   signs: boolean}} Bundles */
 /** The spikes of some neurons, a row each: in cells (rows × bins) the share that fires, in 254ths, 255 where nothing is known; the
  * names of the first and the last.
  * @typedef {{id: string, first: number, every: number, bins: number, rows: number, ends: string[], cells: Uint8Array}} Raster */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
- *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array, pose: Float32Array}} Look */
+ *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array, pose: Float32Array, sums: Float32Array}} Look */
 /** How the pose of a body is drawn: links are two points and a radius in metres, solids the lowest and the highest corner.
  * @typedef {{points: string[], links: number[][], feet: number[], middle: number,
  *   solids: [number[], number[]][]}} Skeleton */
@@ -68,6 +73,7 @@ const SCENE = 1,
   LEFT = 6,
   HELD = 7,
   KIND = 28,
+  SUMS = 8,
   HEAD = 40;
 
 /** Unpack what is compressed behind a head. @param {ArrayBuffer} buffer */
@@ -114,6 +120,15 @@ export function take(buffer, version, look) {
   look.caption = new TextDecoder().decode(new Uint8Array(buffer, text, words));
   look.pose = new Float32Array(buffer.slice(text + words, text + words + 4 * numbers));
   return true;
+}
+
+/** Take over what bundles add up to. @param {ArrayBuffer} buffer @param {Float32Array} sums */
+function takeSums(buffer, sums) {
+  const changed = new DataView(buffer).getUint32(4, true),
+    rows = new Float32Array(buffer, 8 + 4 * changed);
+  new Uint32Array(buffer, 8, changed).forEach((number, at) => {
+    sums.set(rows.subarray(NUMBERS * at, NUMBERS * (at + 1)), NUMBERS * number);
+  });
 }
 
 /** The names of what a neuron or a connection has beside its activity or weight. @param {Scene | null} scene @param {string} id
@@ -265,6 +280,7 @@ export class Link {
         glows: new Uint16Array(lines),
         kinds: new Uint8Array(lines + discs),
         pose: new Float32Array(0),
+        sums: new Float32Array(NUMBERS * this.scene.bundles.joined.length),
       };
       this.listener.scene(this.scene);
     } else if (kind === FRAME && this.scene && this.look && take(data, this.scene.version, this.look)) {
@@ -278,6 +294,13 @@ export class Link {
       this.listener.left(unpackTraces(data, this.scene));
     } else if (kind === RASTER && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.raster(unpackRaster(data, this.scene));
+    } else if (
+      kind === SUMS &&
+      this.scene &&
+      this.look &&
+      new DataView(data).getUint16(2, true) === this.scene.version
+    ) {
+      takeSums(data, this.look.sums);
     } else if (kind === HELD && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.held(await unzip(data));
     }

@@ -60,12 +60,13 @@ export class Zoom {
     this.made = null;
   }
 
-  /** Draw lines, too, which the picture leaves out. @param {Group[]} lines */
-  more(lines) {
+  /** Draw lines, too, which the picture leaves out, those of an open bundle in its place. @param {Group[]} lines
+   * @param {string} [open] */
+  more(lines, open) {
     const { whole } = this;
     if (!whole || (!lines.length && this.scene === whole)) return;
     // above the others, below bundles
-    const { groups } = whole,
+    const groups = whole.groups.filter(({ id }) => id !== open || !lines.length),
       last = groups.reduce((at, { data }, place) => (data.connection === undefined ? at : place + 1), 0),
       at = last || groups.findIndex(({ data }) => data.neuron !== undefined);
     this.scene = lines.length ? { ...whole, groups: [...groups.slice(0, at), ...lines, ...groups.slice(at)] } : whole;
@@ -110,12 +111,14 @@ export class Zoom {
       const box = /^n\d+$/.test(id) && closed.find(({ rect }) => within(rect, shapes[0].at));
       if (box) this.around.set(data.neuron, box);
     }
-    const { fineness, headMore } = scene.constants;
+    const { bundles } = scene,
+      { fineness, headMore } = scene.constants;
     this.made =
       ink === 1 && !closed.length
         ? scene
         : {
             ...scene,
+            bundles: { ...bundles, widest: bundles.widest * ink, narrowest: bundles.narrowest * ink },
             constants: { ...scene.constants, fineness: fineness / ink, headMore: headMore * ink },
             groups: scene.groups.filter((group) => !this.covers(group)).map((group) => this.inked(group)),
           };
@@ -141,6 +144,11 @@ export class Zoom {
     const { ink } = this,
       { id, data, shapes } = group,
       [first] = shapes;
+    if (id.startsWith('bundle:')) {
+      // each band has its own head
+      const bands = shapes.flatMap((_, at) => (at % 2 ? [] : [shapes.slice(at, at + 2)]));
+      return { ...group, shapes: bands.flatMap((band) => this.inked({ ...group, id: '', shapes: band }).shapes) };
+    }
     if (ink === 1 || !(Object.keys(data).length || /^(box|instance|title):/.test(id))) return group;
     const { notch } = /** @type {Scene} */ (this.scene).constants,
       [head, tail] = shapes.filter(({ kind }) => kind === 'head');
