@@ -164,6 +164,27 @@ def test_names_and_titles_of_a_ring_stand_outside_of_it(names: str) -> None:
     assert np.hypot(*(np.array(_middle(title)) - middle)) > np.hypot(*(at - middle).T).min()
 
 
+def test_a_title_is_wrapped_where_it_has_no_room_in_one_line_and_never_cut() -> None:
+    names = [
+        "descending interneurons of the left hemisphere and thorax",
+        "photoreceptors_of_the_compound_eye_layer_four",
+        "medulla intrinsic neurons of columns one to sixteen",
+        "Purkinje cells",
+    ]
+    boxes = "".join(f"  g{k}: {{count: 4, box: {name}}}\n" for k, name in enumerate(names))
+    lines = "".join(f"  g{k} -> g{(k + 1) % 4}: {{pattern: all_to_all}}\n" for k in range(4))
+    drawn = "layout: {engine: organic}\nrender: {size: [400, 400]}\n"
+    network = nv.compile_text(f"neurovis: 1\nname: x\nneurons:\n{boxes}connections:\n{lines}{drawn}")
+    titles = {
+        group.id.removeprefix("title:"): [shape.text for shape in group.shapes if isinstance(shape, Text)]
+        for group in scene_of(network, network.run(2).snapshot(1)).groups
+        if group.id.startswith("title:")
+    }
+    assert max(map(len, titles.values())) > 1
+    for name, said in titles.items():
+        assert "".join(said).replace(" ", "") == name.replace(" ", "")
+
+
 def _middle(text: Text) -> Point:
     """The middle of what a text covers."""
     wide = width(text.text, text.size, text.weight, text.subscript)

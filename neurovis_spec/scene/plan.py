@@ -67,7 +67,7 @@ from neurovis_spec.scene.signals import Signals
 from neurovis_spec.scene.spots import beyond
 from neurovis_spec.scene.teachers import Guide, dash, dotted, drawn_teachers, guides_of, hubs_between, label_of, room_of
 from neurovis_spec.scene.themes import theme_of, tints_of
-from neurovis_spec.scene.titles import Titled, elsewhere, in_one_place, outline
+from neurovis_spec.scene.titles import Heading, Titled, elsewhere, in_one_place, outline
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Snapshot
@@ -363,7 +363,7 @@ class _Texts:
     """Titles by box, labels of neurons, by group what all of its neurons are called, and by entry what connections
     are."""
 
-    titles: Mapping[int, Text]
+    titles: Mapping[int, Heading]
     labels: Sequence[Label | None]
     groups: Mapping[str, tuple[Text, ...]]
     lines: Mapping[str, Text]
@@ -377,7 +377,7 @@ def _texts(content: _Content, page: _OnPage, settings: RenderSettings) -> _Texts
     framed = [index for index, box in enumerate(boxes) if box.sector is None]  # there is no one place along a ring
     kept = [_mapped(rect, page.frame) for rect in content.rooms.values()]
     found = in_one_place([titled[index] for index in framed], obstacles, theme, kept)
-    titles = {framed[place]: text for place, text in found.items()}
+    titles = {framed[place]: heading for place, heading in found.items()}
     labels: list[Label | None] = [None] * len(network.neurons)
     groups: Mapping[str, tuple[Text, ...]] = {}
     lines: Mapping[str, Text] = {}
@@ -395,9 +395,9 @@ def _texts(content: _Content, page: _OnPage, settings: RenderSettings) -> _Texts
         else:
             lines = line_labels(network, page.lines, obstacles, theme, page.picture)
     left = [index for index in range(len(boxes)) if index not in titles]
-    unsaid = {titled[index].computes for index, text in titles.items() if text.text != boxes[index].title}
+    unsaid = {titled[index].computes for index, one in titles.items() if one.words != boxes[index].title}
     others = elsewhere([titled[index] for index in left], obstacles, theme, unsaid)
-    titles |= {index: text for index, text in zip(left, others, strict=True) if text is not None}
+    titles |= {index: one for index, one in zip(left, others, strict=True) if one is not None}
     return _Texts(titles, labels, groups, lines)
 
 
@@ -424,7 +424,7 @@ def _in_front(content: _Content, page: _OnPage, said: _Texts) -> Iterator[Group]
     for entry, text in said.lines.items():
         yield Group(backed(text) if content.said else (text,), id=f"label:{entry}")
     for index in sorted(said.titles):
-        yield Group((said.titles[index],), id=f"title:{page.boxes[index].path}")
+        yield Group(said.titles[index].lines, id=f"title:{page.boxes[index].path}")
 
 
 def _ground(content: _Content, page: _OnPage) -> Ground:

@@ -22,6 +22,7 @@ __all__ = [
     "SUBSCRIPT_SIZE",
     "Cut",
     "number",
+    "parts_of",
     "shorten",
     "width",
     "with_subscript",
@@ -56,7 +57,7 @@ def wrapped(text: str, size: float, room: float, weight: int = 400) -> list[str]
     ['extraor', 'dinarily']
     """
     lines = [""]
-    for between, word in _words(text):
+    for between, word in parts_of(text):
         longer = f"{lines[-1]}{between}{word}"
         if width(longer, size, weight) <= room:
             lines[-1] = longer
@@ -71,7 +72,7 @@ def wrapped(text: str, size: float, room: float, weight: int = 400) -> list[str]
     return lines
 
 
-def _words(text: str) -> Iterator[tuple[str, str]]:
+def parts_of(text: str) -> Iterator[tuple[str, str]]:
     """What a text can be broken into, and what is before each within a line."""
     for number, word in enumerate(text.split()):
         for place, part in enumerate(_PARTS.findall(word)):

@@ -1,10 +1,10 @@
 """Titles of boxes: in the same place of all boxes of a picture, that in which the fewest lines cross them.
 
-In: boxes in user units, what is in the way. Out: a Text for each box, or None where there is no room for any. A title
-that has no room in the place of the others stands elsewhere, in or beside its box. Boxes of one name and size, as
-instances of a module have them, are alike, and so are the instances themselves; elsewhere their titles stand in the
-same place or in its mirror image. Of the boxes that compute the same all say it or none does: one that alone does not
-would seem to compute something else.
+In: boxes in user units, what is in the way. Out: a Heading for each box, or None where there is no room for any. A
+title that has no room in the place of the others stands elsewhere, in or beside its box, in several lines where that
+helps: none is cut. Boxes of one name and size, as instances of a module have them, are alike, and so are the instances
+themselves; elsewhere their titles stand in the same place or in its mirror image. Of the boxes that compute the same
+all say it or none does: one that alone does not would seem to compute something else.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.layout.geometry import Rect, meet
-from neurovis_spec.layout.labels import BOX_WEIGHT, INSTANCE_WEIGHT, TITLE_INSET, TITLE_SIZE
+from neurovis_spec.layout.labels import BOX_WEIGHT, INSTANCE_WEIGHT, LINE, TITLE_INSET, TITLE_SIZE
 from neurovis_spec.layout.model import Point
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.boxes import Box
@@ -26,6 +26,10 @@ from neurovis_spec.scene.obstacles import Obstacles
 
 #: where nothing else helps a name gets as small as the last
 _SIZE, _SMALLER = TITLE_SIZE, (10.0, 9.0)
+#: how wide a title in lines is at most, of its box's width
+_SHARES = (1.5, 1.0, 0.7, 0.5, 0.35)
+#: in how many lines a title is at most, unless there is no room for whole words
+_LINES = 3
 #: instances are more than boxes
 _WEIGHTS = {"box": BOX_WEIGHT, "instance": INSTANCE_WEIGHT}
 #: more in the way than this, and there is no title
@@ -34,6 +38,14 @@ _TOO_MUCH = 10_000
 _FOREIGN = 2_000
 #: how much worse than the line of a frame it is to cover a connection
 _CROSSED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """A title, as it is called and in its lines."""
+
+    words: str
+    lines: tuple[Text, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +66,7 @@ class Titled:
 
 def in_one_place(
     boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme, kept: Sequence[Rect] = ()
-) -> dict[int, Text]:
+) -> dict[int, Heading]:
     """The titles, by number of their boxes, of one size and in the one place that has room for the most of them; of
     several that in which they cover least, rather within the frames and not too small. One that has no room there is in
     the mirror image of the place, as in the other half of a picture. None is on what is ``kept`` for others."""
@@ -81,8 +93,8 @@ def in_one_place(
                 found.update(worded)
             missing, hits = _worth(found)
             best = min(best, (missing, hits + less + each * len(found), found), key=lambda worth: worth[:2])
-    texts = {i: _drawn(boxes[i], title, title.hits, obstacles, theme) for i, title in best[2].items()}
-    return {i: text for i, text in texts.items() if text is not None}
+    drawn = {i: _drawn(boxes[i], title, title.hits, obstacles, theme) for i, title in best[2].items()}
+    return {i: heading for i, heading in drawn.items() if heading is not None}
 
 
 def _in_slot(
@@ -92,7 +104,8 @@ def _in_slot(
     found: dict[int, _Title] = {}
     for i, (item, around) in boxes.items():
         taken = [*kept, *(title.taken for title in found.values())]
-        for title in _at(item, item.box.name if short else item.box.title, size, slot, around, taken, _TOO_MUCH):
+        said = _Said(words := item.box.name if short else item.box.title, (words,), size)
+        for title in _at(item, said, slot, around, taken, _TOO_MUCH):
             if title.hits < _TOO_MUCH and title.taken[2] + slot.inset < item.rect[2] + 1.01:
                 found[i] = title
                 break
@@ -101,14 +114,14 @@ def _in_slot(
 
 def elsewhere(
     boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme, unsaid: Collection[str] = ()
-) -> list[Text | None]:
+) -> list[Heading | None]:
     """Titles that have no room in one place, in the order of the boxes: inside, then just outside; the name alone where
-    the whole of a title that says the same finds no room or is ``unsaid``, or as much of the name as finds it. Where no
-    place is free for all that are alike, those that would cover something find their own."""
+    the whole of a title that says the same finds no room or is ``unsaid``. Where no place is free for all that are
+    alike, those that would cover something find their own."""
     before, told = len(obstacles.texts()), {"", *unsaid}
     while True:
         result = _elsewhere(boxes, obstacles, theme, told)
-        less = {item.computes for text, item in zip(result, boxes, strict=True) if text and text.text != item.box.title}
+        less = {item.computes for one, item in zip(result, boxes, strict=True) if one and one.words != item.box.title}
         if less <= told:
             return result
         told |= less
@@ -117,8 +130,8 @@ def elsewhere(
 
 def _elsewhere(
     boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme, unsaid: Collection[str]
-) -> list[Text | None]:
-    result: list[Text | None] = [None] * len(boxes)
+) -> list[Heading | None]:
+    result: list[Heading | None] = [None] * len(boxes)
     for members in _alike(boxes):
         reach = {i: _grown(boxes[i]) for i in members}
         near = {i: tuple(other for other in boxes[i].foreign if meet(reach[i], other)) for i in members}
@@ -148,37 +161,56 @@ def _alike(boxes: Sequence[Titled]) -> list[list[int]]:
 
 
 @dataclass(frozen=True, slots=True)
+class _Said:
+    """What a title says, the lines of that, and how large these are."""
+
+    words: str
+    lines: tuple[str, ...]
+    size: float
+
+    def wide(self, kind: str) -> float:
+        """How wide it is at the head of a box of this kind."""
+        return max(texts.width(line, self.size, _WEIGHTS[kind]) for line in self.lines)
+
+
+@dataclass(frozen=True, slots=True)
 class _Wording:
-    """What titles say: all or the name alone, how large, and how much of the box's width they may be (0: any)."""
+    """What titles say: all or the name alone, how large, and how much of the box's width their lines may be (0: any);
+    whether words may be ``broken`` for that."""
 
     whole: bool
     size: float
     share: float = 0.0
+    broken: bool = False
 
-    def of(self, item: Titled) -> str:
-        """The text; '' where it would be too short to mean anything."""
+    def of(self, item: Titled) -> _Said | None:
+        """The lines; None where they would be too many, or parts of words."""
         weight = _WEIGHTS[item.box.kind]
         room, across = item.room[2] - item.room[0], item.rect[2] - item.rect[0]
         words = item.box.title if self.whole else item.box.name
-        text = texts.shorten(words, self.size, self.share * min(room, across) if self.share else room, weight)
-        return text if len(text) > 3 or text == words else ""
+        most = self.share * min(room, across) if self.share else room
+        lines = tuple(texts.wrapped(words, self.size, most, weight))
+        if not self.share or self.broken:
+            return _Said(words, lines, self.size)
+        narrow = max(texts.width(part, self.size, weight) for _, part in texts.parts_of(words)) > most
+        return None if narrow or len(lines) > _LINES else _Said(words, lines, self.size)
 
 
-#: best first: all, the name, the name in small, the beginning of the name
+#: best first: all, the name, the name in small; in lines; in as many as it takes
 _WORDINGS = (
     _Wording(True, _SIZE),
     *(_Wording(False, size) for size in (_SIZE, *_SMALLER)),
-    *(_Wording(False, _SIZE, share) for share in (1, 0.7, 0.5, 0.35)),
+    *(_Wording(False, size, share) for size in (_SIZE, _SMALLER[-1]) for share in _SHARES),
+    *(_Wording(False, _SMALLER[-1], share, broken=True) for share in _SHARES[:3]),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class _Title:
-    """What a title says, how large, where its baseline begins, what it covers there, and whether it stands in the
-    mirror image of its place."""
+    """What a title says, where its first baseline begins, what it covers there, and whether it stands in the mirror
+    image of its place."""
 
-    text: str
-    size: float
+    said: _Said
     start: Point
     taken: Rect
     hits: int
@@ -192,17 +224,17 @@ def _worth(titles: Mapping[int, _Title]) -> tuple[int, int]:
 def _found(boxes: Sequence[tuple[Titled, Obstacles]], wordings: Sequence[_Wording]) -> list[_Title] | None:
     """Titles worded alike in the place that covers least; None where there is no place for all."""
     best: tuple[float, list[_Title] | None] = math.inf, None
-    tried: set[tuple[float, tuple[str, ...]]] = set()
+    tried: set[tuple[_Said, ...]] = set()
     for wording in wordings:
-        said = tuple(wording.of(item) for item, _ in boxes)
-        if not all(said) or (wording.size, said) in tried:
+        said = tuple(one for item, _ in boxes if (one := wording.of(item)) is not None)
+        if len(said) < len(boxes) or said in tried:
             continue
-        tried.add((wording.size, said))
+        tried.add(said)
         for slot in _SLOTS:
             titles: list[_Title] = []
             hits = 0
-            for (item, nearby), text in zip(boxes, said, strict=True):
-                places = _at(item, text, wording.size, slot, nearby, (), _FOREIGN)
+            for (item, nearby), one in zip(boxes, said, strict=True):
+                places = _at(item, one, slot, nearby, (), _FOREIGN)
                 if not places or hits + min(place.hits for place in places) >= best[0]:
                     break
                 titles.append(min(places, key=lambda place: place.hits))
@@ -214,13 +246,17 @@ def _found(boxes: Sequence[tuple[Titled, Obstacles]], wordings: Sequence[_Wordin
     return best[1]
 
 
-def _drawn(item: Titled, title: _Title, hits: int, obstacles: Obstacles, theme: Theme) -> Text | None:
+def _drawn(item: Titled, title: _Title, hits: int, obstacles: Obstacles, theme: Theme) -> Heading | None:
     """The title where it has room; lines that cross it keep away from its letters."""
     if hits >= _TOO_MUCH:
         return None
     obstacles.add_text(title.taken)
-    halo = theme.box_fill if hits else ""
-    return Text(title.start, title.text, title.size, theme.muted, weight=_WEIGHTS[item.box.kind], halo=halo)
+    halo, weight, (x, y), size = theme.box_fill if hits else "", _WEIGHTS[item.box.kind], title.start, title.said.size
+    lines = (
+        Text((x, y + row * LINE * size), words, size, theme.muted, weight=weight, halo=halo)
+        for row, words in enumerate(title.said.lines)
+    )
+    return Heading(title.said.words, tuple(lines))
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,34 +299,34 @@ _SLOTS = (
 
 
 def _at(
-    item: Titled, text: str, size: float, slot: _Slot, obstacles: Obstacles, kept: Sequence[Rect], foreign: int
+    item: Titled, said: _Said, slot: _Slot, obstacles: Obstacles, kept: Sequence[Rect], foreign: int
 ) -> list[_Title]:
     """A title in a slot and in its mirror image, as far as there is room; none along a row of a frame that is not as
     wide. What is ``kept`` is too much to cover, a ``foreign`` frame as much as is said."""
     (x0, y0, x1, y1), (low, top, high, bottom) = item.rect, item.room
-    width = texts.width(text, size, _WEIGHTS[item.box.kind])
+    size, width, more = said.size, said.wide(item.box.kind), (len(said.lines) - 1) * LINE * said.size
     rise, drop = slot.gap + _HEIGHT * size, slot.gap + _DEPTH * size
-    y = (y0 + rise, y1 - drop, y0 - drop, y1 + rise)[slot.row]
+    y = (y0 + rise, y1 - drop - more, y0 - drop - more, y1 + rise)[slot.row]
     inset = slot.inset + slot.aside * width
     left, right = x0 + inset, x1 - inset - width
-    if (slot.slid and right < left) or y - _HEIGHT * size < top or y + _DEPTH * size > bottom:
+    if (slot.slid and right < left) or y - _HEIGHT * size < top or y + more + _DEPTH * size > bottom:
         return []
     found: list[_Title] = []
     for over, start in ((False, left + slot.slid * (right - left)), (True, right - slot.slid * (right - left))):
         x = min(max(start, low), high - width)
         if x != start and slot.aside == _BESIDE:
             continue
-        taken = (x - 1, y - _HEIGHT * size, x + width + 1, y + _DEPTH * size)
+        taken = (x - 1, y - _HEIGHT * size, x + width + 1, y + more + _DEPTH * size)
         hits = obstacles.hits(taken, _CROSSED) + _TOO_MUCH * sum(meet(taken, other) for other in kept)
         hits += foreign * sum(meet(taken, other) for other in item.foreign)
-        found.append(_Title(text, size, (x, y), taken, hits, over))
+        found.append(_Title(said, (x, y), taken, hits, over))
     return found
 
 
 def _grown(item: Titled) -> Rect:
     """Where a title of a box may be, and what is near it."""
     (x0, y0, x1, y1), width = item.rect, texts.width(item.box.title, _SIZE, _WEIGHTS[item.box.kind]) + 30
-    return x0 - width, y0 - 40, x1 + width, y1 + 40
+    return x0 - width, y0 - 60, x1 + width, y1 + 60
 
 
 def outline(rect: Rect, step: float = 4.0) -> FloatArray:
