@@ -1,6 +1,7 @@
 """Pictures: ours beside matplotlib with networkx, skia-python and naive Pillow, in one run.
 
-``.venv/bin/python benchmarks/pictures.py [NEURONS…]``. Every contender draws the same step of the same network in as
+``.venv/bin/python benchmarks/pictures.py [NEURONS…]``; ``… pictures.py body``: frames of use case 2 with its body, and
+without. Every contender draws the same step of the same network in as
 many pixels, in a process of its own: seconds of the processor and memory of a still with its PNG, and frames of a film
 (in memory, not encoded) by the clock and for each second of the processor. skia-python and Pillow draw the same shapes,
 matplotlib with networkx its nodes and edges at the same places. The peers are no dependencies: ``pip install matplotlib
@@ -23,10 +24,13 @@ import numpy.typing as npt
 import picture_peers
 from neurovis_renderers.canvas import paint
 from neurovis_renderers.frames import frames
+from neurovis_renderers.moving import Moving, Painter
 from neurovis_renderers.raster import PillowRenderer
 
 from neurovis_spec import api
+from neurovis_spec.compiler.drawing.drawing_settings import Panel
 from neurovis_spec.scene import Film, Scene
+from neurovis_spec.scene.figure import PageGains, figure
 from neurovis_spec.scene.film import film, scene_of_step, still
 from neurovis_spec.scene.look import Look
 from neurovis_spec.scene.shots import shots_of
@@ -34,6 +38,7 @@ from neurovis_spec.scene.shots import shots_of
 #: neurons and connections, about: those of networks that are drawn at random
 SIZES = ((12, 28), (200, 400), (448, 7379), (5000, 96651))
 _STEPS, _LONGEST, _FILM = 40, 60.0, 3.0
+_TIMES = 5
 _USE_CASE = Path(__file__).parents[1] / "specs" / "cpg_rbf.yaml"
 _SPEC = """neurovis: 1
 name: random
@@ -136,7 +141,28 @@ def _pixels(png: bytes) -> npt.NDArray[np.uint8]:
     return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
 
 
+def measure_body() -> None:
+    """Milliseconds of the processor for a frame of a film, without a body and with one; of each frame the least of
+    several, since other work makes any of them longer."""
+    network = api.compile(_USE_CASE.with_name("walk") / "walk.yaml")
+    recording, layout, settings = network.run(_STEPS), network.drawn().value, network.network.render
+    for views in (("network",), ("network", "body")):
+        look = Look(settings, tuple(Panel(view) for view in views), first=0, count=_STEPS, fps=25.0)
+        shots, gains = shots_of(network.network, recording, look), PageGains(network.gains, network.gains)
+        moving = figure(network.network, layout, look, shots, gains)
+        painter, least = Painter(Moving(moving)), np.full(_STEPS, np.inf)
+        for frame in _TIMES * (0, *range(_STEPS)):
+            begun = time.process_time()
+            painter.paint(frame)
+            least[frame] = min(least[frame], time.process_time() - begun)
+        wide, high = moving.scene.pixels
+        print(f"{' and '.join(views):18}{wide} × {high}: {1000 * least.mean():6.1f} ms a frame", flush=True)
+
+
 def main() -> None:
+    if sys.argv[1:] == ["body"]:
+        measure_body()
+        return
     chosen = [int(text) for text in sys.argv[1:]]
     with tempfile.TemporaryDirectory() as folder:
         for neurons, connections in SIZES:

@@ -11,12 +11,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.body import Link, Solid
+from neurovis_spec.body import Solid
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.model import Disc, Group, Point, Polygon, Polyline, Rectangle, Redrawn, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
@@ -25,6 +25,7 @@ from neurovis_spec.scene.strips import SMALL, TITLE, words
 from neurovis_spec.scene.themes import channels
 
 Side: TypeAlias = Literal["above", "side"]
+Metres = TypeVar("Metres", float, FloatArray)
 
 #: How high a drawing is where nothing else is asked for, and the line of numbers beneath it.
 PLOT, NUMBERS = 210.0, 17.0
@@ -39,8 +40,6 @@ _FOOT, _LEAST, _LARGEST = 1.25, 3.4, 9.0
 _WAY, _PALE, _PIECE = 2.0, 0.55, 4.0
 #: Lines that lie on the ground, and how much of a link's colour is left on the far side.
 _LINE, _FAR = 0.8, 0.45
-#: What lies so far aside of the middle, as a share of what the body reaches aside, is on the near or the far side.
-_ASIDE = 0.12
 #: A solid as high as the ground is the ground.
 _FLAT = 1e-6
 
@@ -115,12 +114,12 @@ class _Drawn:
         more = f", {feet} feet, filled where they touch something" if feet else ""
         return f"the body {'from above' if self.side == 'above' else 'from its right side'}{more}"
 
-    def across(self, ahead: float, frame: int) -> float:
+    def across(self, ahead: Metres, frame: int) -> Metres:
         """Where something so far forward lies (metres from the origin of the world)."""
         middle = float(self.poses.middles[frame, 0])
         return (self.left + self.right) / 2 + self.scale * (ahead - middle)
 
-    def down(self, far: float, frame: int) -> float:
+    def down(self, far: Metres, frame: int) -> Metres:
         """Where something so far to the left of the origin, or of such a height, lies."""
         if self.side == "side":
             return self.level - self.scale * far
@@ -180,11 +179,12 @@ class _Drawn:
     def links(self, frame: int) -> tuple[Shape, ...]:
         """Links, the nearest last, then feet, those that touch something in front of those that do not, so that it is
         seen at any time which do, also of two sensors of a leg."""
-        poses, skeleton, theme = self.poses, self.poses.skeleton, self.theme
+        poses, skeleton, theme, colours = self.poses, self.poses.skeleton, self.theme, self._colours
         places, shapes = self._places(frame), list[Shape]()
         order = self._order(frame)
+        far = (order < 0) & (self.side == "side")
         for number in np.argsort(order, kind="stable").tolist():
-            link, colour = skeleton.links[number], self._seen(theme.zero, order[number])
+            link, colour = skeleton.links[number], colours[theme.zero][int(far[number])]
             if link.beside:
                 corners, margin = outline([places[point] for point in link.points]), link.radius * self.scale
                 shapes += [Polygon(corners, theme.box_fill, margin + _CASING), Polygon(corners, colour, margin)]
@@ -192,11 +192,11 @@ class _Drawn:
             line, thick = (places[link.start], places[link.end]), max(2 * link.radius * self.scale, _THIN)
             shapes.append(Polyline(line, theme.box_fill, thick + 2 * _CASING, round=True))
             shapes.append(Polyline(line, colour, thick, round=True))
-        order = self._layers([(foot,) for foot in skeleton.feet], frame) * (self.side == "side")
+        order = poses.layers(frame)[len(skeleton.links) :] * (self.side == "side")
         for number in np.lexsort((poses.touching[frame], order)).tolist():
             touches = poses.touching[frame, number]
             fill, edge = (theme.positive, theme.ink) if touches else (theme.box_fill, theme.muted)
-            fill, edge = (self._seen(colour, order[number]) for colour in (fill, edge))
+            fill, edge = (colours[colour][int(order[number] < 0)] for colour in (fill, edge))
             shapes.append(Disc(places[skeleton.feet[number]], self._feet[number], fill, edge, 1.4))
         return tuple(shapes)
 
@@ -224,10 +224,12 @@ class _Drawn:
         marks: IntArray = np.flatnonzero(np.diff(pieces, prepend=0.0) > 0)
         return marks
 
-    def _seen(self, colour: str, order: float) -> str:
-        """A colour, paler on the far side."""
-        far = self.side == "side" and order < 0
-        return mixed(colour, self.theme.box_fill, _FAR) if far else colour
+    @cached_property
+    def _colours(self) -> dict[str, tuple[str, str]]:
+        """Colours of links and of feet, each as it is and on the far side, where it is paler."""
+        theme = self.theme
+        some = (theme.zero, theme.positive, theme.ink, theme.box_fill, theme.muted)
+        return {colour: (colour, mixed(colour, theme.box_fill, _FAR)) for colour in some}
 
     @cached_property
     def _feet(self) -> list[float]:
@@ -243,35 +245,19 @@ class _Drawn:
         if not self.poses.known[frame]:
             return [(-1e4, -1e4)] * len(self.poses.skeleton.points)
         deep = 1 if self.side == "above" else 2
-        points = self.poses.points[frame]
-        return [(self.across(x, frame), self.down(far, frame)) for x, far in points[:, [0, deep]].tolist()]
+        across, down = self.poses.points[frame][:, [0, deep]].T
+        places = np.stack([self.across(across, frame), self.down(down, frame)], axis=1)
+        return [(x, y) for x, y in places.tolist()]
 
     def _order(self, frame: int) -> FloatArray:
         """Links from back to front. From above, what reaches higher is in front, in the middle of all frames, so that
         it always is; from the side what is right of the body, and of what is in the middle the largest."""
-        links, points = self.poses.skeleton.links, self.poses.points
-        radii = np.array([link.radius for link in links])
+        poses = self.poses
         if self.side == "above":
-            heights = points[:, :, 2].mean(axis=0)
-            tops: FloatArray = np.array([heights[list(link.points)].mean() for link in links]) + radii
-            return tops.round(6)
-        layers = self._layers([link.points for link in links], frame)
-        large = radii + [self._half_length(link, frame) if link.beside else 0.0 for link in links]
-        thick: FloatArray = 0.5 * large / max(float(large.max(initial=0.0)), 1e-300)
-        order: FloatArray = np.where(layers == 0, thick, layers)
+            return poses.tops
+        layers = poses.layers(frame)[: len(poses.skeleton.links)]
+        order: FloatArray = np.where(layers == 0, poses.thick, layers)
         return order
-
-    def _half_length(self, link: Link, frame: int) -> float:
-        """Half of how far the points of a link are from its first one, at most."""
-        points = self.poses.points[frame][list(link.points)]
-        return float(np.linalg.norm(points - points[0], axis=1).max()) / 2
-
-    def _layers(self, ends: Sequence[Sequence[int]], frame: int) -> FloatArray:
-        """On which side of the body something is that lies between points: −1 on the far side, 1 on the near one."""
-        aside = self.poses.points[frame, :, 1] - self.poses.middles[frame, 1]
-        off = np.array([aside[list(one)].mean() for one in ends]) / self.poses.reach.aside
-        layers: FloatArray = np.where(off > _ASIDE, -1.0, np.where(off < -_ASIDE, 1.0, 0.0))
-        return layers
 
     def come(self, frame: int) -> tuple[Shape, ...]:
         """How far it has come, above the frame."""

@@ -208,13 +208,20 @@ class Text:
 def shifted(shape: Shape, by: Point) -> Shape:
     """The same shape, moved by so much to the right and down."""
 
-    def move(point: Point) -> Point:
-        return point[0] + by[0], point[1] + by[1]
+    right, down = by
 
-    match shape:
+    def move(point: Point) -> Point:
+        return point[0] + right, point[1] + down
+
+    match shape:  # the kinds that bodies are drawn of at every frame first, and without ``replace``, which is slow
+        case Polyline():
+            points = tuple((x + right, y + down) for x, y in shape.points)
+            return Polyline(points, shape.stroke, shape.width, shape.opacity, shape.round)
+        case Polygon():
+            return Polygon(tuple((x + right, y + down) for x, y in shape.points), shape.fill, shape.margin)
         case Disc():
-            return replace(shape, centre=move(shape.centre))
-        case Spline() | Polyline() | Polygon():
+            return Disc(move(shape.centre), shape.radius, shape.fill, shape.stroke, shape.stroke_width)
+        case Spline():
             return replace(shape, points=tuple(move(point) for point in shape.points))
         case Arrowhead():
             return replace(shape, tip=move(shape.tip))

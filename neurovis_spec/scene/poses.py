@@ -18,6 +18,8 @@ from neurovis_spec.runtime.recording import Recording
 
 #: Metres from the middle that are shown at least, of a body that is a point.
 _LEAST = 0.05
+#: What lies so far aside of the middle, as a share of what the body reaches aside, is on the near or the far side.
+_ASIDE = 0.12
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +106,44 @@ class Poses:
         return Reach(
             ahead, aside, float(heights.min(initial=0.0)), max(_LEAST, float(heights.max(initial=0.0)) + thick)
         )
+
+    @cached_property
+    def _shares(self) -> FloatArray:
+        """What each point counts in the middle of each link, and of each foot, (links and feet, points)."""
+        skeleton = self.skeleton
+        parts = [*(link.points for link in skeleton.links), *((foot,) for foot in skeleton.feet)]
+        result = np.zeros((len(parts), len(skeleton.points)))
+        for number, some in enumerate(parts):
+            np.add.at(result[number], list(some), 1 / len(some))
+        return result
+
+    def layers(self, frame: int) -> FloatArray:
+        """On which side of the body links and then feet are: −1 on the far side, 1 on the near one, 0 in the middle."""
+        off = self._shares @ (self.points[frame, :, 1] - self.middles[frame, 1]) / self.reach.aside
+        result: FloatArray = np.where(off > _ASIDE, -1.0, np.where(off < -_ASIDE, 1.0, 0.0))
+        return result
+
+    @cached_property
+    def _radii(self) -> FloatArray:
+        return np.array([link.radius for link in self.skeleton.links])
+
+    @cached_property
+    def tops(self) -> FloatArray:
+        """How high links reach, in the middle of all frames, in metres, (links,)."""
+        heights = self._shares[: len(self._radii)] @ self.points[:, :, 2].mean(axis=0)
+        result: FloatArray = (heights + self._radii).round(6)
+        return result
+
+    @cached_property
+    def thick(self) -> FloatArray:
+        """How large links are, as a share of twice the largest, (links,)."""
+        large = self._radii.copy()
+        for number, link in enumerate(self.skeleton.links):
+            if link.beside:
+                ends = self.points[:, list(link.points)]
+                large[number] += np.linalg.norm(ends - ends[:, :1], axis=2).max(initial=0.0) / 2
+        result: FloatArray = 0.5 * large / max(float(large.max(initial=0.0)), 1e-300)
+        return result
 
 
 def posed_of(recording: Recording) -> tuple[Skeleton, FloatArray] | None:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from neurovis_renderers import coverage
 from neurovis_renderers.coverage import LEAST, BoolArray, Fragments, Heads, Numbers, Pieces, Size, Strokes
-from neurovis_renderers.sheet import LANE, WHOLE, Sheet, packed, unpacked
+from neurovis_renderers.sheet import LANE, WHOLE, Sheet, lanes, packed, unpacked
 from neurovis_spec.scene import FloatArray, IntArray, Scene
 
 Pixels = npt.NDArray[np.uint8]
@@ -25,6 +25,10 @@ Pixels = npt.NDArray[np.uint8]
 MOST_AT_ONCE = 1 << 21
 #: Shapes, pieces of lines, and pixels that may be touched, that are drawn at a time.
 _MOST_SHAPES, _MOST_PIECES, _MOST_TOUCHED = 1 << 18, 1 << 16, 1 << 20
+#: Fragments that shapes may have which are drawn at once, whatever hides them.
+_MOST_LAYER = 1 << 22
+#: Pixels for a fragment from which on most are known to be empty.
+_SPARSE = 8
 #: Pixels along the side of a block: a piece of which all blocks are covered is not looked at.
 _BLOCK = 8
 #: So few pieces are drawn without looking whether they are covered.
@@ -44,10 +48,10 @@ def paint(scene: Scene) -> Pixels:
         stack = Stack(size[0] * size[1])
         for low, above, opacity in reversed(sheet.parts()):
             if opacity == 1:
-                for portion in portions(sheet, low, above, top, size, stack.covered):
+                for portion in portions(sheet, low, above, (0, top), size, stack.covered):
                     _put(stack, sheet, portion)
             else:
-                stack.add(*veiled(sheet, low, above, top, size, opacity))
+                stack.add(*veiled(sheet, low, above, (0, top), size, opacity))
         picture[top : top + size[1]] = unpacked(stack.over(background)).reshape(size[1], wide, 3)
     return picture
 
@@ -57,13 +61,39 @@ def _put(stack: Stack, sheet: Sheet, portion: Portion) -> None:
     stack.add(fragments, sheet.paints[fragments.owners], portion.front)
 
 
-def veiled(sheet: Sheet, low: int, above: int, top: int, size: Size, opacity: float) -> tuple[Fragments, IntArray, int]:
+def veiled(
+    sheet: Sheet, low: int, above: int, corner: Size, size: Size, opacity: float
+) -> tuple[Fragments, IntArray, int]:
     """Shapes ``low`` to ``above`` drawn by themselves and then in part: a fragment a pixel, each of its own colour, and
-    the place above them."""
+    the place above them. The picture's first pixel is the sheet's ``corner``."""
     inner = Stack(size[0] * size[1])
-    for portion in portions(sheet, low, above, top, size, inner.covered):
+    for portion in portions(sheet, low, above, corner, size, inner.covered):
         _put(inner, sheet, portion)
     return inner.veil(opacity)
+
+
+def layer(sheet: Sheet, corner: Size, size: Size, opacity: float) -> tuple[Fragments, IntArray]:
+    """The same of all shapes, where they are few, at once."""
+    if sheet.most(size) > _MOST_LAYER:
+        return veiled(sheet, 0, len(sheet), corner, size, opacity)[:2]
+    front, strokes = len(sheet), sheet.strokes(sheet.pieces, corner, size, None)
+    found = Portion(front, sheet.solid(0, front, corner, size), strokes, sheet.heads(0, front, corner, size))
+    fragments = found.fragments(sheet)
+    if len(fragments) * _SPARSE < size[0] * size[1]:
+        by_pixel = slots(fragments, front)
+        left, sums = by_pixel.composed(fragments.shares, sheet.paints[fragments.owners])
+        return _as_one(by_pixel.pixels, sums, left, opacity)
+    left, sums = np.full(size[0] * size[1], WHOLE, np.float32), np.zeros(size[0] * size[1], np.int64)
+    behind = _foremost(fragments, len(left))
+    some = fragments.only(np.flatnonzero((fragments.shares < 1) & (fragments.owners > behind[fragments.pixels])))
+    by_pixel = slots(some, front)
+    above = by_pixel.composed(some.shares, sheet.paints[some.owners])
+    left[by_pixel.pixels], sums[by_pixel.pixels] = above
+    whole = np.flatnonzero(behind >= 0)
+    sums[whole] += left[whole].astype(np.int64) * sheet.paints[behind[whole]]
+    left[whole] = 0
+    seen = np.flatnonzero(left < WHOLE)
+    return _as_one(seen, sums[seen], left[seen], opacity)
 
 
 def bands(size: Size) -> Iterator[tuple[int, Size]]:
@@ -84,34 +114,34 @@ class Portion:
 
     def fragments(self, sheet: Sheet) -> Fragments:
         """All of it, with lines and heads as wide as the sheet says."""
-        widths, wedges = sheet.stroke_shares(self.strokes), sheet.head_shares(self.heads)
-        parts = [
-            self.solid,
-            Fragments(self.strokes.owners, self.strokes.pixels, widths),
-            Fragments(self.heads.owners, self.heads.pixels, wedges),
-        ]
+        parts, (strokes, heads) = [self.solid], (self.strokes, self.heads)
+        if len(strokes):
+            parts.append(Fragments(strokes.owners, strokes.pixels, sheet.stroke_shares(strokes)))
+        if len(heads):
+            parts.append(Fragments(heads.owners, heads.pixels, sheet.head_shares(heads)))
         found = coverage.joined(parts, coverage.NOTHING)
-        return found.only(found.shares > LEAST)
+        there = found.shares > LEAST
+        return found if there.all() else found.only(there)
 
 
-def portions(sheet: Sheet, low: int, high: int, top: int, size: Size, covered: BoolArray) -> Iterator[Portion]:
+def portions(sheet: Sheet, low: int, high: int, corner: Size, size: Size, covered: BoolArray) -> Iterator[Portion]:
     """Shapes ``low`` to ``high`` in a band, from the front to the back in portions. Whoever reads them marks the pixels
     that are ``covered`` by then: these get no more."""
     while high > low:
-        least, pieces = _portion(sheet, low, high, top, size, covered)
-        solid = sheet.solid(least, high, top, size)
+        least, pieces = _portion(sheet, low, high, corner, size, covered)
+        solid = sheet.solid(least, high, corner, size)
         solid = solid.only(~covered[solid.pixels])
-        heads = sheet.heads(least, high, top, size)
+        heads = sheet.heads(least, high, corner, size)
         heads = heads.only(~covered[heads.pixels])
         first, *others = _in_parts(pieces, _touched(sheet, pieces, size))
-        yield Portion(high, solid, sheet.strokes(first, top, size, covered), heads)
+        yield Portion(high, solid, sheet.strokes(first, corner, size, covered), heads)
         for some in others:  # of one shape that is larger than what is drawn at once
-            strokes = sheet.strokes(some, top, size, covered)
+            strokes = sheet.strokes(some, corner, size, covered)
             yield Portion(high, coverage.NOTHING, strokes, heads.only(np.zeros(len(heads), bool)))
         high = least
 
 
-def _portion(sheet: Sheet, low: int, high: int, top: int, size: Size, covered: BoolArray) -> tuple[int, Pieces]:
+def _portion(sheet: Sheet, low: int, high: int, corner: Size, size: Size, covered: BoolArray) -> tuple[int, Pieces]:
     """The next shapes from ``high`` down that are drawn at once: the first of them, and their pieces that are seen."""
     area = np.minimum(np.cumsum(sheet.areas[low:high][::-1]), np.inf)
     least = max(low, high - _MOST_SHAPES, high - max(1, int(np.searchsorted(area, _MOST_TOUCHED, side="right"))))
@@ -121,7 +151,7 @@ def _portion(sheet: Sheet, low: int, high: int, top: int, size: Size, covered: B
         begin = end - _MOST_PIECES
         least = min(int(owners[begin - 1]) + 1, high - 1)
         begin = int(np.searchsorted(owners, least))
-    pieces = _seen(sheet, sheet.pieces.only(slice(begin, end)), top, size, covered)
+    pieces = _seen(sheet, sheet.pieces.only(slice(begin, end)), corner, size, covered)
     total = np.cumsum(_touched(sheet, pieces, size)[::-1])[::-1]
     if len(total) and total[0] > _MOST_TOUCHED:
         beyond = int(np.searchsorted(-total, -_MOST_TOUCHED))
@@ -144,10 +174,10 @@ def _in_parts(pieces: Pieces, touched: FloatArray) -> list[Pieces]:
     return [pieces.only(part == number) for number in np.unique(part).tolist()] or [pieces]
 
 
-def _seen(sheet: Sheet, pieces: Pieces, top: int, size: Size, covered: BoolArray) -> Pieces:
+def _seen(sheet: Sheet, pieces: Pieces, corner: Size, size: Size, covered: BoolArray) -> Pieces:
     """Pieces without those that lie outside the band, or behind what is covered."""
     low, high = coverage.extent(pieces, sheet.halves[pieces.owners].astype(float))
-    shift = np.array([0, top])
+    shift = np.array(corner)
     low, high = low - shift, high - shift
     inside = ((low < size) & (high > 0)).all(axis=1)
     if len(pieces) < _FEW:
@@ -180,6 +210,19 @@ class Slots:
         ends = np.searchsorted(-self.counts, -np.arange(deepest), side="left")
         for depth, end in enumerate(ends.tolist()):
             yield end, self.order[self.begins[:end] + depth]
+
+    def compose(self, shares: Numbers, colours: IntArray, left: Numbers, sums: IntArray) -> None:
+        """Put the fragments behind what is there of each of the pixels: its ``sums``, and the weight ``left``."""
+        for end, which in self.each():
+            weight = np.rint(left[:end] * shares[which])
+            left[:end] -= weight
+            sums[:end] += weight.astype(np.int64) * colours[which]
+
+    def composed(self, shares: Numbers, colours: IntArray) -> tuple[Numbers, IntArray]:
+        """The same of pixels that are empty: the weight that is left of each, and its sums."""
+        left, sums = np.full(len(self.pixels), WHOLE, np.float32), np.zeros(len(self.pixels), np.int64)
+        self.compose(shares, colours, left, sums)
+        return left, sums
 
 
 def slots(fragments: Fragments, front: int, rank: Numbers | None = None) -> Slots:
@@ -220,12 +263,30 @@ def _highest(order: IntArray, key: IntArray, again: BoolArray, rank: Numbers) ->
     return kept
 
 
-def _in_front(fragments: Fragments, pixels: int) -> IntArray:
-    """Which fragments do not lie behind one that covers all of its pixel: of many that lie behind each other few do."""
+def _foremost(fragments: Fragments, pixels: int) -> IntArray:
+    """Of each pixel the foremost shape that covers all of it, −1 where none does."""
     whole = fragments.shares >= 1
     front = np.full(pixels, -1, np.int64)
     np.maximum.at(front, fragments.pixels[whole], fragments.owners[whole])
-    return np.flatnonzero(fragments.owners >= front[fragments.pixels])
+    return front
+
+
+def _in_front(fragments: Fragments, pixels: int) -> IntArray:
+    """Which fragments do not lie behind one that covers all of its pixel: of many that lie behind each other few do."""
+    return np.flatnonzero(fragments.owners >= _foremost(fragments, pixels)[fragments.pixels])
+
+
+def _as_one(pixels: IntArray, sums: IntArray, left: Numbers, opacity: float) -> tuple[Fragments, IntArray]:
+    """What has been composed of some pixels, seen in part: a fragment for each, and their colours."""
+    weight = WHOLE - left
+    colours, some = lanes(sums), np.flatnonzero(left)
+    whole, sums = weight[some].astype(np.int64), sums[some]
+    parts = np.zeros(len(some), np.int64)
+    for lane in range(0, 3 * LANE, LANE):
+        parts |= ((sums >> lane & (1 << LANE) - 1) + whole // 2) // whole << lane
+    colours[some] = parts
+    shares = (weight * np.float32(opacity / WHOLE)).astype(np.float32)
+    return Fragments(np.arange(len(pixels)), pixels, shares), colours
 
 
 class Stack:
@@ -242,10 +303,7 @@ class Stack:
         fragments, colours = fragments.only(seen), colours[seen]
         by_pixel = slots(fragments, front)
         left, sums = self.left[by_pixel.pixels], self.sums[by_pixel.pixels]
-        for end, which in by_pixel.each():
-            weight = np.rint(left[:end] * fragments.shares[which])
-            left[:end] -= weight
-            sums[:end] += weight.astype(np.int64) * colours[which]
+        by_pixel.compose(fragments.shares, colours, left, sums)
         self.left[by_pixel.pixels], self.sums[by_pixel.pixels] = left, sums
         self.covered[by_pixel.pixels] = left <= COVERED
 
@@ -253,13 +311,7 @@ class Stack:
         """What has been composed as one, seen in part: a fragment for each pixel, their colours, and the place above
         them."""
         pixels = np.flatnonzero(self.left < WHOLE)
-        weight = WHOLE - self.left[pixels]
-        whole, sums = weight.astype(np.int64), self.sums[pixels]
-        colours = np.zeros(len(pixels), np.int64)
-        for lane in range(0, 3 * LANE, LANE):
-            colours |= ((sums >> lane & (1 << LANE) - 1) + whole // 2) // whole << lane
-        shares = (weight * np.float32(opacity / WHOLE)).astype(np.float32)
-        return Fragments(np.arange(len(pixels)), pixels, shares), colours, len(pixels)
+        return *_as_one(pixels, self.sums[pixels], self.left[pixels], opacity), len(pixels)
 
     def over(self, background: int) -> IntArray:
         """The sums with a background behind all."""

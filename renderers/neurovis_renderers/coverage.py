@@ -329,6 +329,13 @@ def _ranges(counts: IntArray) -> tuple[IntArray, IntArray]:
     return which, np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
+def _spans(begins: IntArray, counts: IntArray) -> IntArray:
+    """As many numbers as each count says, from its beginning on, one after the other."""
+    result = np.repeat(begins - np.cumsum(counts) + counts, counts)
+    result += np.arange(len(result))
+    return result
+
+
 def _boxes(low: FloatArray, high: FloatArray, size: Size) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
     """The pixels of boxes (n, 2) to (n, 2): which box, the pixel, and where its centre is."""
     first = np.clip(np.floor(low), 0, size).astype(np.int64)
@@ -418,6 +425,9 @@ def heads(tips: FloatArray, ways: FloatArray, lengths: FloatArray, halves: Float
     return Heads(which, pixels, -(x * dx + y * dy).astype(np.float32), np.abs(x * dy - y * dx).astype(np.float32))
 
 
+_NO_POINTS: FloatArray = np.empty((0, 2))
+_NO_ENDS, _NO_WAYS = np.empty(0, np.bool_), np.empty(0, np.int8)
+NO_PIECES = Pieces(_NOWHERE, _NO_POINTS, _NO_POINTS, _NO_ENDS, _NO_ENDS, _NO_WAYS, _NO_WAYS)
 NO_STROKES = Strokes(_NOWHERE, _NOWHERE, *[_NO_NUMBERS] * 5)
 NO_HEADS = Heads(_NOWHERE, _NOWHERE, _NO_NUMBERS, _NO_NUMBERS)
 
@@ -449,42 +459,53 @@ def polygons(corners: FloatArray, size: Size) -> Fragments:
     left out."""
     if not len(corners):
         return NOTHING
-    owners = np.repeat(np.arange(len(corners)), corners.shape[1])
-    starts, ends = corners.reshape(-1, 2), np.roll(corners, -1, axis=1).reshape(-1, 2)
     first = np.clip(np.floor(corners[:, :, 1].min(axis=1)), 0, size[1]).astype(np.int64)
     last = np.clip(np.ceil(corners[:, :, 1].max(axis=1)), 0, size[1]).astype(np.int64)
     rows = np.maximum(last - first, 0)
+    left, right = np.clip(_sides(corners, first, rows), 0, size[0])
+    owner = np.repeat(np.arange(len(corners), dtype=np.int32), rows)
+    begin = np.arange(len(owner)) * size[0] + np.repeat((first - np.cumsum(rows) + rows) * size[0], rows)
+    low, high = np.floor(left.min(axis=0)).astype(np.int64), np.ceil(right.max(axis=0)).astype(np.int64)
+    inner, outer = np.ceil(left.max(axis=0)).astype(np.int64), np.floor(right.min(axis=0)).astype(np.int64)
+    inner = np.minimum(inner, high)
+    outer = np.clip(outer, inner, high)
+    front = np.full(size[0] * size[1], -1, np.int32)
+    # owners ascend, and the last one stays
+    front[_spans(begin + inner, outer - inner)] = np.repeat(owner, outer - inner)
+    whole = np.flatnonzero(front >= 0)
+    parts = [Fragments(front[whole].astype(np.int64), whole, np.ones(len(whole), np.float32))]
+    for start, end in ((low, inner), (outer, high)):
+        counts = np.maximum(end - start, 0)
+        pixels, row = _spans(begin + start, counts), np.repeat(np.arange(len(owner)), counts)
+        seen = np.flatnonzero(owner[row] > front[pixels])
+        pixels, row = pixels[seen], row[seen]
+        x = (pixels - begin[row]).astype(np.float32)
+        within = np.minimum(np.take(right, row, axis=1), x + 1)
+        within -= np.maximum(np.take(left, row, axis=1), x)
+        np.clip(within, 0, 1, out=within)
+        parts.append(_fragments(owner[row].astype(np.int64), pixels, within.sum(axis=0) / _SLICES))
+    return joined(parts, NOTHING)
+
+
+def _sides(corners: FloatArray, first: IntArray, rows: IntArray) -> Numbers:
+    """Where convex polygons (n, k, 2) begin and end in each slice of their rows: so many each, from the ``first`` on;
+    (2, slices of a row, rows of all). Nothing of one is in slices where both are 0."""
+    owners = np.repeat(np.arange(len(corners)), corners.shape[1])
+    starts, ends = corners.reshape(-1, 2), np.roll(corners, -1, axis=1).reshape(-1, 2)
     slices = np.concatenate([[0], np.cumsum(_SLICES * rows)])
-    sides = np.zeros((2, slices[-1]), np.float32)  # where each slice begins and ends; nothing of it is within at 0, 0
+    sides = np.zeros((2, slices[-1]), np.float32)
     for side, (begin, end) in enumerate(((starts, ends), (ends, starts))):  # edges that lead down, then those up
-        down = end[:, 1] > begin[:, 1]
+        down = np.flatnonzero(end[:, 1] > begin[:, 1])
         begin, end, owner = begin[down], end[down], owners[down]
         at = [_SLICES * (edge[:, 1] - first[owner]) - 0.5 for edge in (begin, end)]  # in slices of its polygon
         low, high = (np.clip(np.ceil(one), 0, _SLICES * rows[owner]).astype(np.int64) for one in at)
-        edge, place = _ranges(np.maximum(high - low, 0))
-        place = place + low[edge]
-        share = (place - at[0][edge]) / (at[1] - at[0])[edge]
-        x = begin[edge, 0] + share * (end[edge, 0] - begin[edge, 0])
-        sides[side, slices[owner[edge]] + place] = x
-    left, right = np.clip(np.sort(sides, axis=0), 0, size[0]).reshape(2, -1, _SLICES)
-    owner = np.repeat(np.arange(len(corners)), rows)
-    begin = (np.arange(len(owner)) - np.repeat(np.cumsum(rows) - rows, rows) + first[owner]) * size[0]
-    low, high = (np.floor(left.min(axis=1)).astype(np.int64), np.ceil(right.max(axis=1)).astype(np.int64))
-    inner, outer = (np.ceil(left.max(axis=1)).astype(np.int64), np.floor(right.min(axis=1)).astype(np.int64))
-    inner, outer = np.minimum(inner, high), np.clip(outer, np.minimum(inner, high), high)
-    row, place = _ranges(outer - inner)
-    front = np.full(size[0] * size[1], -1, np.int64)
-    front[begin[row] + inner[row] + place] = owner[row]  # owners ascend, and the last one stays
-    whole = np.flatnonzero(front >= 0)
-    parts = [Fragments(front[whole], whole, np.ones(len(whole), np.float32))]
-    for start, end in ((low, inner), (outer, high)):
-        row, place = _ranges(np.maximum(end - start, 0))
-        seen = np.flatnonzero(owner[row] > front[begin[row] + start[row] + place])
-        row, x = row[seen], start[row[seen]] + place[seen]
-        within = np.minimum(right[row], (x + 1)[:, None].astype(np.float32))
-        within -= np.maximum(left[row], x[:, None].astype(np.float32))
-        parts.append(_fragments(owner[row], begin[row] + x, np.clip(within, 0, 1).mean(axis=1)))
-    return joined(parts, NOTHING)
+        counts = np.maximum(high - low, 0)
+        place = _spans(low, counts)
+        share = (place - np.repeat(at[0], counts)) / np.repeat(at[1] - at[0], counts)
+        x = np.repeat(begin[:, 0], counts) + share * np.repeat(end[:, 0] - begin[:, 0], counts)
+        sides[side, _spans(slices[owner] + low, counts)] = x
+    each = np.ascontiguousarray(sides.reshape(2, -1, _SLICES).transpose(0, 2, 1))
+    return np.stack([np.minimum(*each), np.maximum(*each)])
 
 
 def rectangle(corner: Point, extent: Point, radius: float, size: Size) -> Fragments:

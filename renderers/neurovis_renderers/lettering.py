@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from neurovis_renderers.coverage import Fragments, Size
+from neurovis_renderers.coverage import Fragments, Numbers, Size
 from neurovis_renderers.truetype import read
-from neurovis_spec.scene import HALO, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, Scene, Text
+from neurovis_spec.scene import HALO, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, IntArray, Scene, Text
 
 #: Regular and bold.
 FONTS = tuple(Path(__file__).parent / "fonts" / name for name in ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf"))
@@ -25,6 +25,8 @@ FONTS = tuple(Path(__file__).parent / "fonts" / name for name in ("DejaVuSans.tt
 BOLD = 600
 #: texts are drawn so much larger, then reduced: glyphs stand where they should, to a fraction of a pixel
 _FINER = 8
+#: where a glyph of that size goes on to the next pixel, as FreeType rounds
+_HALF = 32.5 / 64
 
 
 @lru_cache(maxsize=64)
@@ -56,27 +58,62 @@ def lettering(text: Text, size: Size, halo: bool = False) -> Fragments:
     runs = [(text.text, text.size, 0.0)]
     if text.subscript:
         runs.append((text.subscript, SUBSCRIPT_SIZE * text.size, SUBSCRIPT_DROP * text.size))
-    fonts = [font(_FINER * points, bold) for _, points, _ in runs]
-    lengths = [made.getlength(words) / _FINER for made, (words, _, _) in zip(fonts, runs, strict=True)]
+    long = sum(_length(words, points, bold) for words, points, _ in runs)
     # what reads upward is drawn where it stands before it is turned by a quarter about the picture's corner
     x, baseline = (-text.point[1], text.point[0]) if text.upward else text.point
-    x -= {"start": 0.0, "middle": sum(lengths) / 2, "end": sum(lengths)}[text.anchor]
+    x -= {"start": 0.0, "middle": long / 2, "end": long}[text.anchor]
     reach = math.ceil(HALO * text.size) if halo else 0
-    left, top = int(np.floor(x)) - 2 - reach, int(np.floor(baseline - 1.2 * text.size)) - 1 - reach
-    wide, high = int(sum(lengths)) + 6 + 2 * reach, int(2 * text.size) + 4 + 2 * reach
-    tile = Image.new("L", (wide * _FINER, high * _FINER))
-    pen = ImageDraw.Draw(tile)
+    left, top = math.floor(x) - 2 - reach, math.floor(baseline - 1.2 * text.size) - 1 - reach
+    begin = (x - left) * _FINER
+    if all(_stand_alone(words, points, bold) for words, points, _ in runs):
+        begin = math.floor(begin + _HALF)
+    # on a whole pixel, as browsers have it
+    lines = tuple((words, points, math.floor(baseline + drop + 0.5) - top) for words, points, drop in runs)
     stroke = round(HALO * text.size * _FINER) if halo else 0
-    for made, (words, _, drop), length in zip(fonts, runs, lengths, strict=True):
-        row = math.floor(baseline + drop + 0.5)  # on a whole pixel, as browsers have it
-        at = ((x - left) * _FINER, (row - top) * _FINER)
-        pen.text(at, words, fill=255, font=made, anchor="ls", stroke_width=stroke)
-        x += length
-    share = np.asarray(tile.reduce(_FINER), np.float32) / np.float32(255)
+    rows, columns, share, (high, wide) = _glyphs(lines, bold, begin, (reach, stroke), text.upward)
     if text.upward:
-        share, left, top = np.rot90(share), top, -left - share.shape[1]
-    rows, columns = np.nonzero(share)
-    rows, columns, share = rows + top, columns + left, share[rows, columns]
-    kept = (rows >= 0) & (rows < size[1]) & (columns >= 0) & (columns < size[0])
-    pixels = (rows * size[0] + columns)[kept].astype(np.int64)
-    return Fragments(np.zeros(len(pixels), np.int64), pixels, share[kept])
+        left, top = top, -left - high
+    pixels = rows * size[0] + columns + (top * size[0] + left)
+    owners = np.zeros(len(pixels), np.int64)
+    if left >= 0 and top >= 0 and left + wide <= size[0] and top + high <= size[1]:
+        return Fragments(owners, pixels, share)
+    rows, columns = rows + top, columns + left
+    kept = np.flatnonzero((rows >= 0) & (rows < size[1]) & (columns >= 0) & (columns < size[0]))
+    return Fragments(owners, pixels, share).only(kept)
+
+
+@lru_cache(maxsize=4096)
+def _length(words: str, points: float, bold: bool) -> float:
+    """How long a text is, in pixels."""
+    return font(_FINER * points, bold).getlength(words) / _FINER
+
+
+@lru_cache(maxsize=4096)
+def _stand_alone(words: str, points: float, bold: bool) -> bool:
+    """Whether every letter begins on a whole part of a pixel, if the first does: none is moved closer to another. Then
+    a text that moves over a picture looks only so many ways as a pixel has parts, and each is drawn once."""
+    each = [_length(letter, points, bold) * _FINER for letter in words]
+    return all(length.is_integer() for length in each) and sum(each) == _length(words, points, bold) * _FINER
+
+
+@lru_cache(maxsize=512)
+def _glyphs(
+    lines: tuple[tuple[str, float, int], ...], bold: bool, begin: float, around: tuple[int, int], upward: bool
+) -> tuple[IntArray, IntArray, Numbers, tuple[int, int]]:
+    """Texts one after the other, each with its size and the row of its baseline, from ``begin`` on, which counts parts
+    of a pixel; ``around`` is how many pixels are left for their halo, and how thick that is in parts. The rows and the
+    columns of pixels, how much of each is covered, and of how many rows and columns they are."""
+    reach, stroke = around
+    long, most = sum(_length(words, points, bold) for words, points, _ in lines), lines[0][1]
+    wide, high = int(long) + 6 + 2 * reach, int(2 * most) + 4 + 2 * reach
+    tile, at = Image.new("L", (wide * _FINER, high * _FINER)), begin
+    pen = ImageDraw.Draw(tile)
+    for words, points, row in lines:
+        made = font(_FINER * points, bold)
+        pen.text((at, row * _FINER), words, fill=255, font=made, anchor="ls", stroke_width=stroke)
+        at += made.getlength(words)
+    covered = np.asarray(tile.reduce(_FINER))
+    covered = np.rot90(covered) if upward else covered
+    rows, columns = np.nonzero(covered)
+    high, wide = covered.shape
+    return rows, columns, covered[rows, columns].astype(np.float32) / np.float32(255), (high, wide)

@@ -8,7 +8,6 @@ where a line is wider or narrower. What moves otherwise (a caption, a cursor) is
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import lru_cache
 
@@ -16,24 +15,18 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_renderers import coverage
-from neurovis_renderers.canvas import COVERED, Pixels, Stack, bands, portions, slots, veiled
+from neurovis_renderers.canvas import COVERED, Pixels, Stack, bands, layer, portions, slots
 from neurovis_renderers.coverage import BoolArray, Fragments, Heads, Numbers, Size, Strokes
-from neurovis_renderers.sheet import LANE, WHOLE, Sheet, packed, packed_all
+from neurovis_renderers.sheet import LANE, WHOLE, Sheet, lanes, packed, packed_all
 from neurovis_spec.scene import (
     HEAD_MORE,
     HEAD_OF_LENGTH,
     HEAD_OF_WIDTH,
     Arrowhead,
-    Disc,
     Film,
     FloatArray,
     Group,
-    Image,
     IntArray,
-    Polygon,
-    Polyline,
-    Ramp,
-    Rectangle,
     Spline,
     Text,
     Theme,
@@ -41,7 +34,6 @@ from neurovis_spec.scene import (
     filled_shape,
     part,
     readable,
-    shifted,
     still,
 )
 
@@ -51,6 +43,7 @@ _STEP = np.float32(1 / 64)
 _MUCH = 0.4
 #: Fragments that are kept of a band.
 MOST_KEPT = 6_000_000
+_NO_COLOURS: IntArray = np.empty(0, np.int64)
 _Words = npt.NDArray[np.uint32]
 #: How lines end, as a Film has it.
 _Ends = npt.NDArray[np.int8]
@@ -165,33 +158,6 @@ def _stands_apart(film: Film, group: Group) -> bool:
     return bool(changes) or group.opacity != 1
 
 
-def _reach(group: Group, density: float, axis: int) -> tuple[float, float]:
-    """Where shapes begin and end across (0) or down (1), in pixels: from where on and up to where something of them
-    may be seen."""
-    lows, highs = [math.inf], [-math.inf]
-    for shape in group.shapes:
-        match shape:
-            case Disc():
-                places, reach = [shape.centre[axis]], shape.radius + shape.stroke_width
-            case Spline() | Polyline():
-                places, reach = [point[axis] for point in shape.points], shape.width
-            case Polygon():
-                places, reach = [point[axis] for point in shape.points], shape.margin
-            case Arrowhead():
-                places, reach = [shape.tip[axis]], shape.length + shape.half_width
-            case Text() if axis and not shape.upward:
-                places, reach = [shape.point[1]], 3 * shape.size
-            case Rectangle() | Ramp() | Image():
-                begin, extent = shape.corner[axis], (shape.width, shape.height)[axis]
-                places, reach = [begin, begin + extent], shape.stroke_width if isinstance(shape, Rectangle) else 0.0
-            case _:
-                return -1e9, 1e9
-        lows.append(min(places) - reach)
-        highs.append(max(places) + reach)
-    low, high = min(lows), max(highs)
-    return (low * density, high * density) if low <= high else (0.0, 0.0)
-
-
 @lru_cache(maxsize=4096)
 def _readable(theme: Theme, fill: int) -> int:
     """The colour of a text that can be read on a colour."""
@@ -222,7 +188,7 @@ class Band:
         stack = Stack(size[0] * size[1])
         stack.add(found.only(still), colours[found.owners[still]], front)
         #: the colour of each pixel behind all that changes
-        self.behind = _lanes(stack.over(packed(moving.theme.background)))
+        self.behind = lanes(stack.over(packed(moving.theme.background)))
         chosen = np.flatnonzero(kept)
         found = found.only(chosen)
         by_pixel = slots(found, front)
@@ -261,7 +227,7 @@ def _gathered(moving: Moving, top: int, size: Size) -> tuple[Fragments, Strokes,
     widest, narrowest = moving.sheet.with_halves(*moving.most), moving.sheet.with_halves(*moving.least)
     stack, nothing = Stack(size[0] * size[1]), np.zeros(1, np.int64)
     still, strokes, heads, count = list[Fragments](), list[Strokes](), list[Heads](), 0
-    for portion in portions(widest, 0, len(widest), top, size, stack.covered):
+    for portion in portions(widest, 0, len(widest), (0, top), size, stack.covered):
         seen = portion.fragments(narrowest)
         stack.add(seen, np.broadcast_to(nothing, len(seen)), portion.front)
         still.append(seen.only(~moving.shaped[seen.owners]))
@@ -302,16 +268,6 @@ def _sorted_out(
     return kept, seen & ~kept
 
 
-def _lanes(sums: IntArray) -> IntArray:
-    """Sums of colours times weights that add up to ``WHOLE``, as packed colours."""
-    rounded = sums + (WHOLE // 2) * (1 | 1 << LANE | 1 << 2 * LANE)
-    mask = (1 << LANE) - 1
-    result = rounded >> 13 & 255
-    result |= (rounded >> LANE & mask) >> 13 << LANE
-    result |= (rounded >> 2 * LANE & mask) >> 13 << 2 * LANE
-    return result
-
-
 def _words(sums: IntArray) -> _Words:
     """The same as red, green, blue and nothing, a byte each."""
     rounded = sums + (WHOLE // 2) * (1 | 1 << LANE | 1 << 2 * LANE)
@@ -324,10 +280,25 @@ def _words(sums: IntArray) -> _Words:
 def _put_on(picture: _Words, fragments: Fragments, colours: IntArray) -> None:
     """Draw a fragment a pixel, each of its own colour, in front of a picture."""
     part = fragments.shares < 1
-    picture[fragments.pixels[~part]] = _words(colours[~part] * WHOLE)
+    picture[fragments.pixels[~part]] = _bytes(colours[~part])
     behind = _lanes_of(picture[fragments.pixels[part]])
     weights = np.rint(fragments.shares[part] * WHOLE).astype(np.int64)
     picture[fragments.pixels[part]] = _words(colours[part] * weights + behind * (WHOLE - weights))
+
+
+def _bytes(colours: IntArray) -> _Words:
+    """Packed colours as red, green, blue and nothing, a byte each."""
+    result = colours & 255
+    result |= colours >> LANE - 8 & 255 << 8
+    result |= colours >> 2 * LANE - 16 & 255 << 16
+    return result.astype(np.uint32)
+
+
+def _three(picture: _Words) -> Pixels:
+    """Red, green and blue alone, (n, 3): each word is written over the fourth byte of the one before."""
+    result = np.empty(3 * len(picture) + 1, np.uint8)
+    np.ndarray(picture.shape, np.uint32, result.data, 0, (3,))[:] = picture
+    return result[:-1].reshape(-1, 3)
 
 
 def _lanes_of(words: _Words) -> IntArray:
@@ -450,27 +421,23 @@ class _Painted:
             picture[pixels] = _words(self._composed(pixels, colours, among))
         for _, fragments, shades in self._apart[among:]:
             _put_on(picture, fragments, shades)
-        channels = picture.view(np.uint8).reshape(high, wide, 4)
-        result = np.empty((high, wide, 3), np.uint8)
-        for channel in range(3):  # quicker than all three at once
-            result[:, :, channel] = channels[:, :, channel]
-        return result
+        return _three(picture).reshape(high, wide, 3)
 
     def _drawn(self, number: int, group: Group) -> tuple[Group, Fragments, IntArray]:
         """A group that stands apart: a fragment for each pixel, and its colours. What has not changed is kept."""
         if number < len(self._apart) and self._apart[number][0] == group:
             return self._apart[number]
-        band, density = self._band, self._moving.sheet.density
-        low, above = _reach(group, density, 1)
-        first, last = (int(np.clip(row - band.top, 0, band.size[1])) for row in (low - 2, above + 3))
-        low, above = _reach(group, density, 0)
-        left, right = (int(np.clip(column, 0, band.size[0])) for column in (low - 2, above + 3))
-        shapes = tuple(shifted(shape, (-left / density, 0.0)) for shape in group.shapes) if left else group.shapes
-        sheet, wide = Sheet((replace(group, shapes=shapes, opacity=1.0),), density), max(right - left, 1)
-        size = wide, last - first
-        fragments, colours, _ = veiled(sheet, 0, len(sheet), band.top + first, size, group.opacity)
+        band, sheet = self._band, Sheet((replace(group, opacity=1.0),), self._moving.sheet.density)
+        low, above = sheet.extent
+        corner = np.array([0, band.top])
+        left, first = np.clip(low - corner - 2, 0, band.size).astype(np.int64).tolist()
+        right, last = np.clip(above - corner + 3, 0, band.size).astype(np.int64).tolist()
+        if right <= left or last <= first:
+            return group, coverage.NOTHING, _NO_COLOURS
+        size = right - left, last - first
+        fragments, colours = layer(sheet, (left, band.top + first), size, group.opacity)
         owners = np.full(len(fragments), self._moving.apart_places[number])
-        row, column = np.divmod(fragments.pixels, wide)
+        row, column = np.divmod(fragments.pixels, size[0])
         pixels = (row + first) * band.size[0] + column + left
         return group, Fragments(owners, pixels, fragments.shares), colours
 

@@ -39,6 +39,8 @@ from neurovis_spec.scene import (
 #: A colour and its weight are whole numbers: red, green and blue times a weight of at most ``WHOLE`` stand side by side
 #: in one integer of 64 bits, ``LANE`` bits each, and are added at once.
 WHOLE, LANE = 1 << 13, 21
+#: No letter is wider, in sizes of its text.
+_WIDEST = 2.0
 
 
 def packed(colour: str) -> int:
@@ -71,6 +73,16 @@ def unpacked(sums: IntArray) -> npt.NDArray[np.uint8]:
         value += WHOLE // 2
         value >>= 13
         result[:, lane] = value
+    return result
+
+
+def lanes(sums: IntArray) -> IntArray:
+    """Sums of colours times weights that add up to ``WHOLE``, as packed colours."""
+    rounded = sums + (WHOLE // 2) * (1 | 1 << LANE | 1 << 2 * LANE)
+    mask = (1 << LANE) - 1
+    result = rounded >> 13 & 255
+    result |= (rounded >> LANE & mask) >> 13 << LANE
+    result |= (rounded >> 2 * LANE & mask) >> 13 << 2 * LANE
     return result
 
 
@@ -184,6 +196,8 @@ class Sheet:
     @cached_property
     def pieces(self) -> Pieces:
         """All solid splines as straight pieces, by the order of their shapes; a piece's owner is its place."""
+        if not self._splines:
+            return coverage.NO_PIECES
         points = np.array(list(chain.from_iterable(shape.points for _, shape in self._splines)), float).reshape(-1, 2)
         begins = np.concatenate([[0], np.cumsum([len(shape.points) for _, shape in self._splines])]).astype(np.int64)
         found = coverage.flatten(points * self.density, begins)
@@ -276,58 +290,104 @@ class Sheet:
     @cached_property
     def _polygon_arrays(self) -> tuple[IntArray, FloatArray]:
         """Places of polygons, and their corners in pixels, (n, k, 2), of those with few the last several times."""
-        rounded = np.zeros((len(self._polygons), 1, 2))
-        counts = np.array([len(corners) for _, corners, _ in self._polygons], np.int64)
-        for count in np.unique(counts).tolist():
-            alike = np.flatnonzero(counts == count)
-            points = np.array([self._polygons[k][1] for k in alike.tolist()]) * self.density
-            margins = np.array([self._polygons[k][2] for k in alike.tolist()]) * self.density
-            made = coverage.rounded(points, margins)
-            more = max(made.shape[1], rounded.shape[1])
-            made, rounded = (np.pad(one, ((0, 0), (0, more - one.shape[1]), (0, 0)), "edge") for one in (made, rounded))
-            rounded[alike] = made
+        alike: dict[int, list[int]] = {}
+        for number, (_, corners, _) in enumerate(self._polygons):
+            alike.setdefault(len(corners), []).append(number)
+        made: list[tuple[list[int], FloatArray]] = []
+        for some in alike.values():
+            points = np.array([self._polygons[number][1] for number in some]) * self.density
+            margins = np.array([self._polygons[number][2] for number in some]) * self.density
+            made.append((some, coverage.rounded(points, margins)))
+        rounded = np.zeros((len(self._polygons), max((each.shape[1] for _, each in made), default=1), 2))
+        for some, each in made:
+            rounded[some, : each.shape[1]] = each
+            rounded[some, each.shape[1] :] = each[:, -1:]
         return np.array([place for place, _, _ in self._polygons], np.int64), rounded
 
-    def heads(self, low: int, high: int, top: int, size: Size) -> Heads:
-        """The heads of lines among shapes ``low`` to ``high``, as they lie over rows from ``top`` on."""
+    def heads(self, low: int, high: int, corner: Size, size: Size) -> Heads:
+        """The heads of lines among shapes ``low`` to ``high``, as they lie over pixels from a ``corner`` on."""
         places, table = _between(*self._head_arrays, low, high)
-        tips = table[:, :2] - (0, top)
+        if not len(places):
+            return coverage.NO_HEADS
+        tips = table[:, :2] - corner
         near = _reaches(tips[:, 1], table[:, 4] + table[:, 5], size)
         found = coverage.heads(tips[near], table[near, 2:4], table[near, 4], table[near, 5], size)
         return replace(found, owners=places[near][found.owners])
 
-    def solid(self, low: int, high: int, top: int, size: Size) -> Fragments:
-        """The fragments of all but solid splines and heads, of shapes ``low`` to ``high``, in rows from ``top`` on."""
+    def solid(self, low: int, high: int, corner: Size, size: Size) -> Fragments:
+        """The fragments of all but solid splines and heads, of shapes ``low`` to ``high``, in pixels from a ``corner``
+        on."""
         found = []
         places, table = _between(*self._disc_arrays, low - 1, high)
-        near = _reaches(table[:, 1] - top, table[:, 2] + table[:, 3], size)
-        places, centres, radii, widths = places[near], table[near, :2] - (0, top), table[near, 2], table[near, 3]
-        found.append(_owned(coverage.discs(centres, radii, size), places))
-        found.append(_owned(coverage.rings(centres, radii, widths, size), places + 1))
+        if len(places):
+            near = _reaches(table[:, 1] - corner[1], table[:, 2] + table[:, 3], size)
+            places, centres, radii, widths = places[near], table[near, :2] - corner, table[near, 2], table[near, 3]
+            found.append(_owned(coverage.discs(centres, radii, size), places))
+            found.append(_owned(coverage.rings(centres, radii, widths, size), places + 1))
         places, corners = _between(*self._polygon_arrays, low, high)
-        found.append(_owned(coverage.polygons(corners - (0, top), size), places))
+        if len(places):
+            found.append(_owned(coverage.polygons(corners - corner, size), places))
         for place, end, shape in self._others:
             if place < high and end > low:
-                found += [_owned(part, place + number) for number, part in enumerate(self._other(shape, top, size))]
+                found += [_owned(part, place + number) for number, part in enumerate(self._other(shape, corner, size))]
         made = coverage.joined(found, coverage.NOTHING)
-        return made.only((made.owners >= low) & (made.owners < high))
+        return made.only((made.owners >= low) & (made.owners < high)) if low or high < len(self) else made
 
-    def _other(self, shape: Shape, top: int, size: Size) -> list[Fragments]:
+    def most(self, size: Size) -> float:
+        """How many fragments there may be in a picture of a size, at most, about."""
+        texts = [shape for _, _, shape in self._others if isinstance(shape, Text)]
+        whole = len(self._others) - len(texts) + 2 * bool(self._polygons)
+        letters = sum(6 * shape.size**2 * (len(shape.text) + len(shape.subscript) + 2) for shape in texts)
+        discs, heads = self._disc_arrays[1], self._head_arrays[1]
+        round_ = 8 * ((discs[:, 2] + discs[:, 3] + 1) ** 2).sum() + 4 * (heads[:, 4:].sum(axis=1) ** 2).sum()
+        length = np.hypot(*(self.pieces.ends - self.pieces.starts).T)
+        halves = self.halves[self.pieces.owners] + 2
+        lines = (np.minimum(length + 2 * halves, sum(size)) * 3 * halves).sum()
+        return whole * size[0] * size[1] + letters * self.density**2 + float(round_ + lines)
+
+    @cached_property
+    def extent(self) -> tuple[FloatArray, FloatArray]:
+        """The least and the greatest place at which anything may be seen, (2,) each, in pixels."""
+        lows, highs = [np.full((1, 2), np.inf)], [np.full((1, 2), -np.inf)]
+
+        def reach(points: FloatArray, beyond: FloatArray | float) -> None:
+            lows.append(points - beyond)
+            highs.append(points + beyond)
+
+        if self._polygons:
+            reach(self._polygon_arrays[1].reshape(-1, 2), 0.0)
+        if self._discs:
+            table = self._disc_arrays[1]
+            reach(table[:, :2], (table[:, 2] + table[:, 3])[:, None])
+        if self._heads:
+            table = self._head_arrays[1]
+            reach(table[:, :2], (table[:, 4] + table[:, 5])[:, None])
+        if self._splines:
+            halves = self.halves[self.pieces.owners].astype(float)
+            low, high = coverage.extent(self.pieces, halves)
+            lows.append(low)
+            highs.append(high)
+        for _, _, shape in self._others:
+            for corner, beyond in _reach(shape):
+                reach(np.array([corner]) * self.density, np.array([beyond]) * self.density)
+        return np.concatenate(lows).min(axis=0), np.concatenate(highs).max(axis=0)
+
+    def _other(self, shape: Shape, corner: Size, size: Size) -> list[Fragments]:
         density = self.density
 
         def pixels(point: Point) -> Point:
-            return point[0] * density, point[1] * density - top
+            return point[0] * density - corner[0], point[1] * density - corner[1]
 
         match shape:
             case Spline():
                 dash = [part * density for part in shape.dash]
                 return [coverage.dashed([pixels(p) for p in shape.points], shape.width * density, dash, size)]
             case Rectangle():
-                corner, extent = pixels(shape.corner), (shape.width * density, shape.height * density)
+                near, extent = pixels(shape.corner), (shape.width * density, shape.height * density)
                 radius, width = shape.radius * density, shape.stroke_width * density
                 return [
-                    coverage.rectangle(corner, extent, radius, size),
-                    coverage.outline(corner, extent, radius, width, size),
+                    coverage.rectangle(near, extent, radius, size),
+                    coverage.outline(near, extent, radius, width, size),
                 ]
             case Ramp():
                 return self._ramp(shape, pixels(shape.corner), size)
@@ -356,11 +416,27 @@ class Sheet:
             result.append(coverage.rectangle(corner, extent, 0, size))
         return result
 
-    def strokes(self, pieces: Pieces, top: int, size: Size, hidden: BoolArray | None) -> Strokes:
-        """The solid splines of these pieces, as they run over rows from ``top`` on."""
-        shift = (0, top)
-        pieces = replace(pieces, starts=pieces.starts - shift, ends=pieces.ends - shift)
+    def strokes(self, pieces: Pieces, corner: Size, size: Size, hidden: BoolArray | None) -> Strokes:
+        """The solid splines of these pieces, as they run over pixels from a ``corner`` on."""
+        if not len(pieces):
+            return coverage.NO_STROKES
+        pieces = replace(pieces, starts=pieces.starts - corner, ends=pieces.ends - corner)
         return coverage.strokes(pieces, self.halves[pieces.owners].astype(float), size, hidden)
+
+
+def _reach(shape: Shape) -> list[tuple[Point, Point]]:
+    """Corners of a shape, and how far it may reach beyond each, across and down, in user units."""
+    match shape:
+        case Text():
+            along, aside = _WIDEST * shape.size * (len(shape.text) + len(shape.subscript) + 1), 3 * shape.size
+            return [(shape.point, (aside, along) if shape.upward else (along, aside))]
+        case Spline():
+            return [(point, (shape.width, shape.width)) for point in shape.points]
+        case Rectangle() | Ramp() | Image():
+            (x, y), edge = shape.corner, shape.stroke_width if isinstance(shape, Rectangle) else 0.0
+            return [(corner, (edge, edge)) for corner in (shape.corner, (x + shape.width, y + shape.height))]
+        case _:
+            raise TypeError(f"no shape that is drawn singly: {shape}")
 
 
 def _between(places: IntArray, table: FloatArray, low: int, high: int) -> tuple[IntArray, FloatArray]:
