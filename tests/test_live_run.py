@@ -32,6 +32,7 @@ from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Reach, Source
 from neurovis_spec.live.turns import Lesion, Set
+from neurovis_spec.live.undefined import Undefined, undefined_in
 from neurovis_spec.live.view import BAR, FAINT, FINENESS, LEVELS, UNDEFINED, View, view_of
 from neurovis_spec.scene.encode import looks
 
@@ -272,3 +273,11 @@ def test_neurons_without_a_finite_activity_are_marked() -> None:
             marked.append((view.glance(source.seen()).kinds[-2:] & UNDEFINED > 0).tolist())
             source.advance()
     assert marked == [[False, False], [True, False], [True, True], [True, True]]
+    told, before = [], None
+    for step in (0, 1, 2, 3, 1, 0, 3):
+        source.go(step)
+        before = undefined_in(view, view.glance(source.seen()), source, before)
+        told.append(before)
+        assert before == undefined_in(view, view.glance(source.seen()), source, None)
+    one, both = Undefined("n0", 1, True, 1), Undefined("n0", 1, True, 2)
+    assert told == [None, one, both, both, one, None, both]

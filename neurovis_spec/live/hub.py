@@ -49,12 +49,14 @@ from neurovis_spec.live.protocol import (
     status_message,
     sums_message,
     trace_message,
+    undefined_message,
     values_message,
 )
 from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.source import NOTHING, Drawn
 from neurovis_spec.live.sums import SumArray
 from neurovis_spec.live.typed import findings
+from neurovis_spec.live.undefined import Undefined
 from neurovis_spec.live.view import View
 
 _LOG: Final = logging.getLogger(__name__)
@@ -85,6 +87,8 @@ class Client:
     status: str = ""
     #: the body that it was told of
     body: Drawn = NOTHING
+    #: what it was told of that is not finite
+    undefined: Undefined | None = None
     #: the serials of frames that were sent and are not drawn yet
     ahead: deque[int] = field(default_factory=deque)
     #: what it wants the values of, and whether it has just asked
@@ -316,6 +320,9 @@ class Hub:
         if client.body.skeleton is not shown.body.skeleton:
             client.body = shown.body
             yield body_message(shown.body)
+        if client.undefined != shown.undefined:
+            client.undefined = shown.undefined
+            yield undefined_message(shown.undefined)
         if client.sent < self._serial and len(client.ahead) < AHEAD:
             since, client.sent = client.sent, self._serial
             client.ahead.append(self._serial)

@@ -58,6 +58,7 @@ from neurovis_spec.live.source import Drawn, Reach
 from neurovis_spec.live.sums import SumArray
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh
 from neurovis_spec.live.typed import LONGEST
+from neurovis_spec.live.undefined import Undefined
 from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
@@ -174,6 +175,13 @@ def body_message(body: Drawn) -> str:
     if skeleton is None or skeleton.size > _POSED:
         return _text("body", skeleton=None, start=[0.0, 0.0])
     return _text("body", skeleton=json.loads(text_of(skeleton)), start=list(body.start))
+
+
+def undefined_message(undefined: Undefined | None) -> str:
+    """What is not finite, and since when; nothing where all is."""
+    if undefined is None:
+        return _text("undefined", item="", since=0, known=True, count=0)
+    return _text("undefined", **asdict(undefined))
 
 
 def _future(future: Future) -> dict[str, object]:

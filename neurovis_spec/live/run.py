@@ -46,6 +46,7 @@ from neurovis_spec.live.series import Series
 from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, Source, SourceError
 from neurovis_spec.live.turns import Turned
 from neurovis_spec.live.typed import Typed
+from neurovis_spec.live.undefined import Undefined, undefined_in
 from neurovis_spec.live.view import Glance, View
 from neurovis_spec.runtime.errors import RecordingError
 
@@ -89,6 +90,7 @@ class Shown:
     left: History | None
     body: Drawn
     quantities: FloatArray | None
+    undefined: Undefined | None
 
 
 Stage: TypeAlias = tuple[Source, View]
@@ -158,6 +160,8 @@ class Run:
         self.appearance, self._drawing = view.appearance, False
         #: the step to go to, which is further than has been reached
         self._target: int | None = None
+        #: what was not finite at the step that was shown last, and of what that was true
+        self._undefined: tuple[View, tuple[Turned, ...], Undefined | None] = view, (), None
         self._clock, self._pace = self._clock_of(source, 1.0), Pace()
         self._typed = Typed()
         self._series: tuple[Network, Typed, dict[str, Series]] | None = None
@@ -441,4 +445,14 @@ class Run:
         before = None if left is None else left.history
         for history in (source.history, *(() if before is None else (before,))):
             history.follow(self._followed())
-        return Shown(self._view, seen, glance, reach, status, source.history, before, source.body, source.quantities)
+        lost = self._not_finite(glance, status.turned)
+        past = source.history, before
+        return Shown(self._view, seen, glance, reach, status, *past, source.body, source.quantities, lost)
+
+    def _not_finite(self, glance: Glance, turned: tuple[Turned, ...]) -> Undefined | None:
+        """What is not finite at the step that is shown."""
+        view, same, known = self._undefined
+        before = known if view is self._view and same == turned else None
+        found = undefined_in(self._view, glance, self._source, before)
+        self._undefined = self._view, turned, found
+        return found

@@ -14,6 +14,7 @@ import { listKeys } from './keys.js';
 import { Marks } from './marks.js';
 import { Matrix } from './matrix.js';
 import { Measuring } from './measuring.js';
+import { NotFinite } from './notfinite.js';
 import { Outline } from './outline.js';
 import { arrangePanels, greet } from './panels.js';
 import { under } from './pick.js';
@@ -185,6 +186,7 @@ const link = new Link({
     } else if (message.type === 'values') attention.take(message);
     else if (message.type === 'body') body.use(message.skeleton, message.start);
     else if (message.type === 'findings') controls.found(message);
+    else if (message.type === 'undefined') notFinite.tell(message, controls.owner);
     else if (message.type === 'moved') placing.take(message);
     else if (message.type === 'placed') placing.told(message);
     else if (message.type === 'saving') {
@@ -216,6 +218,7 @@ const attention = new Attention(link, zoom, redraw, (group) => {
   strips.hold(group);
 });
 const beside = new Beside();
+const notFinite = new NotFinite(link, attention, part);
 const outline = new Outline(attention, beside, part, (id) => go(id));
 const scrubber = new Scrubber(link, part, redraw);
 const axis = new Axis(scrubber, part);

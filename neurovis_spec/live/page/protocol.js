@@ -50,9 +50,12 @@ import { isStill } from './camera.js';
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
  *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
  *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[], measures: {number: number, text: string}[]}} Status */
+/** What is not finite: the first, since which step, or an earlier one that is not known, and how many are; '' where nothing is.
+ * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
  *   | {type: 'body', skeleton: Skeleton | null, start: number[]}
  *   | {type: 'findings', text: string, errors: boolean}
+ *   | Nonfinite
  *   | {type: 'moved', discs: Object<string, number[]>, lines: Object<string, number[][]>}
  *   | {type: 'placed', neurons: string[], undo: boolean, files: boolean}
  *   | {type: 'saving', files: string[], diff: string, written: boolean}
