@@ -20,12 +20,14 @@ from neurovis_spec.live.commands import (
     Command,
     Draw,
     Event,
+    Loop,
     Pause,
     Play,
     Restart,
     Seek,
     Speed,
     Step,
+    Unloop,
 )
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.run import Run, Shown
@@ -190,6 +192,35 @@ def test_a_recording_that_has_ended_plays_from_its_beginning() -> None:
     assert not shown.status.ended
     assert shown.glance.step < 49
     made.run.end()
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_steps_that_are_known_are_played_over_and_over(recorded: bool) -> None:
+    """Nothing is added to them; what was turned in them is turned again."""
+    of = RecordedSource(COMPILED.network, COMPILED.run(steps=61)) if recorded else SimulatedSource(COMPILED.simulator())
+    made = Driven(of)
+    made.ask(Seek(60))
+    assert made.ask(Loop(20, 99)).status.loop is None
+    assert made.refused == ["steps 20 to 99 cannot be played again"]
+    assert made.ask(Loop(20, 30)).status.loop == (20, 30)
+    begun = len(made.shown)
+    made.run.ask(Speed(4.0))
+    made.run.ask(Play())
+    made.until(lambda shown: [one.glance.step for one in made.shown[begun:]].count(20) > 1)
+    made.ask(Pause())
+    steps = [one.glance.step for one in made.shown[begun:]]
+    assert set(steps[steps.index(20) :]) <= set(range(20, 31))
+    assert made.shown[-1].reach.last == 60
+    made.run.ask(Speed(math.inf))
+    made.run.ask(Play())
+    made.run.ask(Unloop())
+    made.until(lambda shown: shown.glance.step >= 50)
+    made.ask(Pause())
+    if not recorded:
+        made.ask(Seek(25), Loop(20, 30), Restart())
+        assert made.shown[-1].status.loop is None
+    made.run.end()
+    assert made.run.failure is None
 
 
 def test_nothing_is_shown_to_nobody() -> None:

@@ -23,6 +23,8 @@ INK = (
     "(c => c.toDataURL() != Object.assign(document.createElement('canvas'), {{width: c.width, "
     "height: c.height}}).toDataURL())({0})"
 )
+#: A curve is asked for by typing it.
+TYPED = "document.querySelector('#measure').value = {0}; document.querySelector('#measuring').requestSubmit()"
 MARKS = INK.format("document.querySelector('#marks')")
 
 
@@ -428,11 +430,8 @@ def test_a_curve_is_added_by_typing_it_and_those_who_look_on_see_it(tmp_path: Pa
             await opened.until(f"{STEP} > 60")
             step = await pause(opened)
             await opened.key("c")
-            typing = (
-                "document.querySelector('#measure').value = {0}; document.querySelector('#measuring').requestSubmit()"
-            )
             said = "document.querySelector('#mismeasured').textContent"
-            await opened.ask(typing.format("'mean(hiden)'"))
+            await opened.ask(TYPED.format("'mean(hiden)'"))
             await opened.until(f"{said}.includes(\"no neuron, output or parameter 'hiden'\")")
             field = "document.querySelector('#measure')"
             assert await opened.ask(f"{field}.value.slice({field}.selectionStart, {field}.selectionEnd)") == "hiden"
@@ -442,7 +441,7 @@ def test_a_curve_is_added_by_typing_it_and_those_who_look_on_see_it(tmp_path: Pa
             )
             assert {"rms(T - O", "rms(T - K3", "rms(T - eta"} <= set(offered.split(","))
             assert not await opened.ask("document.querySelector('#mismeasured').classList.contains('wrong')")
-            await opened.ask(typing.format("'rms(T - O, last=20)'"))
+            await opened.ask(TYPED.format("'rms(T - O, last=20)'"))
             await opened.until(f"{TRACE.format(0)}?.startsWith('rms(T - O, last=20) from step 0 to {step}')")
             run = compiled.run(step + 1)
             values = compiled.measure("rms(T - O, last=20)", run)
@@ -451,7 +450,7 @@ def test_a_curve_is_added_by_typing_it_and_those_who_look_on_see_it(tmp_path: Pa
             now = "Number(document.querySelectorAll('.now')[0].textContent.replace('−', '-'))"
             await opened.until(f"Math.abs({now} - {values[step]}) < 1e-5")
             assert await opened.ask(f"{field}.value") == ""
-            await opened.ask(typing.format("'K3 -> O'"))
+            await opened.ask(TYPED.format("'K3 -> O'"))
             await opened.until(f"{TITLE.format(1)} == 'K3 → O'")
             await opened.ask("document.querySelectorAll('.pin')[1].click()")
             await opened.key("Escape")
@@ -459,11 +458,91 @@ def test_a_curve_is_added_by_typing_it_and_those_who_look_on_see_it(tmp_path: Pa
             await opened.until(
                 f"[0, 1, 2].some((at) => {TRACE.replace('{0}', 'at')}?.startsWith('rms(T - O, last=20) from'))"
             )
-            await opened.ask(typing.format("'mean(K)'"))
+            await opened.ask(TYPED.format("'mean(K)'"))
             await opened.until("document.querySelector('#refusal').textContent.includes('only looks on')")
             await opened.call("Page.navigate", url=access.url())
             await opened.until(f"{TITLE.format(2)}?.startsWith('rms')")
             await opened.ask("document.querySelectorAll('.pin')[2].click()")
             await opened.until(f"{TITLE.format(2)} == ''")
+
+    asyncio.run(main())
+
+
+def test_two_signals_share_an_axis_or_span_a_plane_and_part_again(tmp_path: Path) -> None:
+    """What is drawn in the plane are the values of the steps, each against that of the same step."""
+    join = (
+        "((place, how) => {{ const menu = document.querySelectorAll('.join')[place]; "
+        "menu.value = [...menu.options].find((one) => one.text == how).value; menu.onchange(); }})({0}, '{1}')"
+    )
+    ink = (  # of several lists of points, how many of each have some
+        "((c, lists, pixels = c.getContext('2d').getImageData(0, 0, c.width, c.height).data, "
+        "there = (x, y) => pixels[4 * (Math.round(y) * c.width + Math.round(x)) + 3] > 60) => lists.map((points) => "
+        "points.filter(([x, y]) => [-1, 0, 1].some((dx) => [-1, 0, 1].some((dy) => there(x + dx, y + dy)))).length))"
+        "(document.querySelector('.plane'), {0})"
+    )
+
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await opened.until(f"{STEP} > 200")
+            step = await pause(opened)
+            for name in ("C1", "K2", "O"):
+                await opened.ask(TYPED.format(f"'{name}'"))
+            run = compiled.run(step + 1)
+            await opened.ask(join.format(0, "with K2"))
+            await opened.until(f"{TITLE.format(0)} == 'C1K2' && {TITLE.format(1)} == 'O'")
+            await opened.until(f"{TRACE.format(0)}?.startsWith('C1 and K2 from step 0 to {step}')")
+            ends = str(await opened.ask(TRACE.format(0))).replace("−", "-").partition("between ")[2].split(" and ")
+            assert [float(one) for one in ends] == pytest.approx([run["C1"].min(), run["K2"].max()], rel=1e-4)
+            await opened.ask(join.format(0, "apart"))
+            await opened.until(f"{TITLE.format(0)} == 'C1' && {TITLE.format(2)} == 'K2'")
+            await opened.ask(join.format(1, "against C1"))
+            await opened.until(f"{TRACE.format(1)}?.startsWith('O against C1 from step 0 to {step}')")
+            height = (await numbers(opened, "document.querySelector('.plane').height"))[0]
+            wide = 2 * height
+            sides = [(run[name] - run[name].min()) / np.ptp(run[name]) for name in ("C1", "O")]
+            pairs = zip(*(side.tolist() for side in sides), strict=True)
+            points = [[8 + (wide - 16) * x, height - 8 - (height - 16) * y] for x, y in pairs][::7]
+            mirrored = [[wide - x, y] for x, y in points]
+            found = await opened.ask(ink.format([points, mirrored]))
+            assert isinstance(found, list)
+            assert found[0] == len(points)
+            assert found[1] < 0.7 * len(points)
+            await opened.ask(join.format(1, "over time"))
+            await opened.until(f"{TRACE.format(1)}?.startsWith('O from step 0 to {step}')")
+
+    asyncio.run(main())
+
+
+def test_a_range_is_shown_alone_and_played_over_and_over(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await opened.until(f"{STEP} > 300")
+            last = await pause(opened)
+            await opened.ask(TYPED.format("'O'"))
+            await opened.until(f"{TRACE.format(0)}?.startsWith('O from step 0 to {last}')")
+            box = "document.querySelector('.trace').getBoundingClientRect()"
+            left, top, width = await numbers(opened, *(f"{box}.{name}" for name in ("left", "top", "width")))
+            for kind, share in (("mousePressed", 0.25), ("mouseMoved", 0.4), ("mouseReleased", 0.5)):
+                x = left + 8 + share * (width - 16)
+                more = {"button": "left", "buttons": 1, "clickCount": 1, "modifiers": 8}
+                await opened.call("Input.dispatchMouseEvent", type=kind, x=x, y=top + 20, **more)
+            low, high = round(0.25 * last), round(0.5 * last)
+            await opened.until(f"Math.abs({SCRUB}.min - {low}) < 3 && Math.abs({SCRUB}.max - {high}) < 3")
+            low, high, here = (int(one) for one in await numbers(opened, f"{SCRUB}.min", f"{SCRUB}.max", STEP))
+            assert here == last, "to look closer is not to go elsewhere"
+            await opened.until(f"{TRACE.format(0)}?.startsWith('O from step {low} to {high}')")
+            assert await opened.ask("document.querySelector('#cursor').hidden")
+            await opened.ask("document.querySelector('#loop').click()")
+            await opened.until(
+                f"document.querySelector('#loop').getAttribute('aria-pressed') == 'true' && {STEP} < {high}"
+            )
+            await opened.until(f"{STEP} > {high - 20}", 60)
+            await opened.until(f"{STEP} < {low + 20}", 60)
+            assert await opened.ask(f"{SCRUB}.max") == str(high)
+            turned = {"x": left + 0.5 * width, "y": top + 20, "deltaX": 0, "deltaY": -100, "modifiers": 8}
+            await opened.call("Input.dispatchMouseEvent", type="mouseWheel", **turned)
+            await opened.until(f"{SCRUB}.min > {low} && {SCRUB}.max < {high}")
+            await opened.ask("document.querySelector('#unzoom').click()")
+            await opened.until(f"{SCRUB}.min == '0' && document.querySelector('#zoomed').hidden")
 
     asyncio.run(main())

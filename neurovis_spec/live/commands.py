@@ -129,6 +129,19 @@ class Unmeasure:
 
 
 @dataclass(frozen=True, slots=True)
+class Loop:
+    """What is played goes from this step to that one, and from the first of them again."""
+
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, slots=True)
+class Unloop:
+    """What is played goes on."""
+
+
+@dataclass(frozen=True, slots=True)
 class Present:
     """Show the current step once more, for a client that has just connected."""
 
@@ -141,7 +154,7 @@ class Draw:
 
 
 Showing: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Restart | Branch | Switch | Undo | Speed
-Command: TypeAlias = Showing | Measure | Unmeasure | Turn
+Command: TypeAlias = Showing | Loop | Unloop | Measure | Unmeasure | Turn
 
 
 #: Where what was put by hand is written: into ``layout.positions`` of the spec, or into the layout file that the spec

@@ -17,6 +17,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -30,6 +31,7 @@ from neurovis_spec.live.joined import Joined, joined
 from neurovis_spec.live.protocol import (
     ADDED,
     LEFT,
+    PAIRS,
     TRACE,
     Close,
     Connections,
@@ -218,22 +220,22 @@ class Hub:
         client, self._reader = self._waiting.popleft(), None
         wanted, client.wanted = client.wanted, None
         if client in self._clients and shown is not None and wanted is not None:
-            found = {item: shown.view.members(item) for item in wanted.items}
-            items = {shown.view.place(item): members for item, members in found.items() if members is not None}
-
-            def read(history: History, kind: int) -> bytes:
-                traces = {place: history.read(members, wanted.bins) for place, members in items.items()}
-                return trace_message(self._version, traces, wanted.bins, kind)
-
+            read = partial(self._traces, shown.view)
             client.traces = (
-                *(() if shown.left is None else (read(shown.left, LEFT),)),
-                read(shown.history, TRACE),
+                *(() if shown.left is None else (read(shown.left, wanted.items, wanted.bins, LEFT),)),
+                read(shown.history, wanted.items, wanted.bins, TRACE),
+                *((read(shown.history, wanted.pairs, wanted.steps, PAIRS),) if wanted.pairs else ()),
                 *(self._raster(shown, item, wanted.bins) for item in wanted.rasters),
             )
             client.wake.set()
         self._rest = self._loop.time() + _REST * (time.thread_time() - begun)
         if self._waiting:
             self._reader = self._loop.call_at(self._rest, self._read_traces)
+
+    def _traces(self, view: View, history: History, items: tuple[str, ...], bins: Bins, kind: int) -> bytes:
+        found = {item: view.members(item) for item in items}
+        ranges = {view.place(item): history.read(one, bins) for item, one in found.items() if one is not None}
+        return trace_message(self._version, ranges, bins, kind)
 
     def _raster(self, shown: Shown, item: str, bins: Bins) -> bytes:
         names, members = shown.view.raster(item)

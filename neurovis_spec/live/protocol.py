@@ -32,6 +32,7 @@ from neurovis_spec.live.commands import (
     Draw,
     Event,
     Fetch,
+    Loop,
     Measure,
     Pause,
     PlaceNeuron,
@@ -44,6 +45,7 @@ from neurovis_spec.live.commands import (
     Step,
     Switch,
     Undo,
+    Unloop,
     Unmeasure,
     Unplace,
     Write,
@@ -63,7 +65,7 @@ from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
-SCENE, FRAME, TRACE, FILE, RASTER, LEFT, HELD, SUMS, JOINED, ADDED = range(1, 11)
+SCENE, FRAME, TRACE, FILE, RASTER, LEFT, HELD, SUMS, JOINED, ADDED, PAIRS = range(1, 12)
 #: kind, scene
 _SCENE_HEAD = struct.Struct("<BxH")
 #: kind, scene, how many bundles
@@ -164,6 +166,7 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         appearance=asdict(status.appearance),
         backend=status.backend,
         futures=[_future(one) for one in status.futures],
+        loop=None if status.loop is None else list(status.loop),
         measures=[{"number": number, "text": text} for number, text in status.measures],
     )
 
@@ -217,7 +220,7 @@ def values_message(step: int, values: Mapping[str, float]) -> str:
 def trace_message(version: int, traces: Mapping[tuple[int, int], Range], bins: Bins, kind: int = TRACE) -> bytes:
     """Traces of items (``View.place``), each with what of it that is: 0 its activity or weight, else the
     number of a name in the list that the scene has for it, from 1 on. The least and the largest value of each bin. Of
-    the ``kind`` LEFT they are those of the future that was left last."""
+    the ``kind`` LEFT they are those of the future that was left last; of PAIRS a bin is a step."""
     head = _TRACE_HEAD.pack(kind, version, len(traces), bins.first, bins.every, bins.count)
     items = np.array(list(traces), "<u4").reshape(-1, 2).T
     return b"".join([head, items.tobytes(), *(trace.astype("<f4").tobytes() for trace in traces.values())])
@@ -310,12 +313,21 @@ class Themed:
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """The client wants to be sent once how some items went, in bins of steps, and the ``rasters`` of the groups of some
-    neurons; viewers may ask for it, too."""
+    """The client wants to be sent once how some items went, in bins of steps, the ``rasters`` of the groups of some
+    neurons, and of ``pairs`` that are drawn against each other the latest of these steps one by one; viewers may ask
+    for it, too."""
 
     items: tuple[str, ...]
     bins: Bins
     rasters: tuple[str, ...] = ()
+    pairs: tuple[str, ...] = ()
+
+    @property
+    def steps(self) -> Bins:
+        """The latest of the steps, one by one."""
+        bins = self.bins
+        count = min(_BINS, bins.every * bins.count)
+        return Bins(bins.first + bins.every * bins.count - count, 1, count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -468,12 +480,19 @@ def _items(value: object) -> tuple[str, ...]:
     raise ProtocolError(f"at most {_WATCHED} ids of neurons and connections are wanted")
 
 
-def _trace(items: tuple[str, ...], first: int, every: int, bins: int, rasters: tuple[str, ...] = ()) -> Trace:
-    if len(items) > _TRACED or len(rasters) > _RASTERS:
+def _trace(
+    items: tuple[str, ...],
+    first: int,
+    every: int,
+    bins: int,
+    rasters: tuple[str, ...] = (),
+    pairs: tuple[str, ...] = (),
+) -> Trace:
+    if max(len(items), len(pairs)) > _TRACED or len(rasters) > _RASTERS:
         raise ProtocolError(f"at most {_TRACED} traces and {_RASTERS} rasters are wanted")
     if any(item[0] != "n" or "." in item for item in rasters):
         raise ProtocolError("rasters are of neurons")
-    return Trace(items, Bins(first, every, bins), rasters)
+    return Trace(items, Bins(first, every, bins), rasters, pairs)
 
 
 def _held(value: object) -> str:
@@ -494,6 +513,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
         {
             "items": _items,
             "rasters": _items,
+            "pairs": _items,
             "first": _whole(0, _MOST),
             "every": _whole(1, _EVERY),
             "bins": _whole(1, _BINS),
@@ -515,6 +535,8 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "draw": ({**dict.fromkeys(_GAINS, _factor), "pathways": _truth}, _draw),
     "speed": ({"value": _speed}, Speed),
     "measure": ({"text": _measure_text}, Measure),
+    "loop": ({"first": _whole(0, _MOST), "last": _whole(0, _MOST)}, Loop),
+    "unloop": ({}, Unloop),
     "unmeasure": ({"number": _whole(0, _MOST)}, Unmeasure),
     "set": ({"values": _values, "moving": _truth}, Set),
     "feed": ({"name": _name, "values": _numbers, "moving": _truth}, Feed),
@@ -531,6 +553,6 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "fetch": ({"what": _one_of("svg", "film", "npz"), "seconds": _seconds}, Fetch),
 }
 #: Members that a message need not have.
-_OPTIONAL: Final = {"moving", "pathways", "rasters"}
+_OPTIONAL: Final = {"moving", "pathways", "rasters", "pairs"}
 #: The types of the messages that a client may send, for the tests of the documentation.
 MESSAGES: Final = tuple(_MESSAGES)

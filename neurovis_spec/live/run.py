@@ -27,6 +27,7 @@ from neurovis_spec.live.commands import (
     Command,
     Draw,
     Event,
+    Loop,
     Measure,
     Pause,
     Play,
@@ -37,6 +38,7 @@ from neurovis_spec.live.commands import (
     Step,
     Switch,
     Undo,
+    Unloop,
     Unmeasure,
 )
 from neurovis_spec.live.curves import series_of
@@ -59,7 +61,7 @@ class Status:
     """What a client is told of a run when it changes: ``ended`` where there is no further step; ``events``, the steps
     at which the spec has some; ``backend``, what makes the steps, "" where that is not known;
     ``futures``, what else the run has done behind steps of its past; ``measures``, the number and the text of each that
-    somebody has typed."""
+    somebody has typed; ``loop``, the first and the last step of what is played over and over."""
 
     playing: bool
     speed: float
@@ -74,6 +76,7 @@ class Status:
     backend: str
     futures: tuple[Future, ...]
     measures: tuple[tuple[int, str], ...] = ()
+    loop: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,6 +167,8 @@ class Run:
         self._undefined: tuple[View, tuple[Turned, ...], Undefined | None] = view, (), None
         self._clock, self._pace = self._clock_of(source, 1.0), Pace()
         self._typed = Typed()
+        #: the first and the last step of what is played over and over
+        self._loop: tuple[int, int] | None = None
         self._series: tuple[Network, Typed, dict[str, Series]] | None = None
         self._thread = Thread(target=self._drive, name="live run", daemon=True)
         self.failure: Exception | None = None
@@ -255,7 +260,9 @@ class Run:
         source, now = self._source, time.perf_counter()
         match asked:
             case Play():
-                if self._ended:
+                if self._loop is not None:
+                    self._loop_back(source.step < self._loop[0])
+                elif self._ended:
                     source.restart()
                 self._playing, self._ended, self._target = True, False, None
                 self._clock.start(now)
@@ -271,13 +278,13 @@ class Run:
                 self._go(self._event(asked.by))
             case Restart():
                 source.restart()
-                self._target, self._ended = None, False
+                self._target, self._ended, self._loop = None, False, None
                 self._clock.start(now)
             case Branch():
                 source.branch()
             case Switch():
                 source.switch(asked.number)
-                self._target, self._ended = None, False
+                self._target, self._ended, self._loop = None, False, None
                 self._clock.start(now)
             case Undo():
                 source.take_back(asked.number)
@@ -291,6 +298,10 @@ class Run:
                 asked.what(source)
             case Present():
                 pass
+            case Loop():
+                self._play_over(asked)
+            case Unloop():
+                self._loop = None
             case Measure():
                 self._measure(self._typed.add(asked.text, source.network))
             case Unmeasure():
@@ -298,6 +309,7 @@ class Run:
             case _ if callable(asked):
                 self._source, self._view = asked(source)
                 if self._source is not source:
+                    self._loop = None
                     self._typed = self._typed.on(self._source.network)
                 self._redraw(refuse)
                 self._clock = self._clock_of(self._source, self._clock.speed)
@@ -305,6 +317,26 @@ class Run:
                 self._ended, self._target = False, None
             case _:
                 source.turn(asked)
+
+    def _play_over(self, asked: Loop) -> None:
+        """Play these steps over and over. Raises SourceError for such as cannot be gone to."""
+        reach = self._source.reach
+        if not reach.first <= asked.first < asked.last <= reach.last or self._source.capabilities.arrives:
+            raise SourceError(f"steps {asked.first} to {asked.last} cannot be played again")
+        self._loop = asked.first, asked.last
+
+    def _loop_back(self, begin: bool = False) -> bool:
+        """Go to the first step of what is played over and over, from its last, or to ``begin``; whether it did. Of what
+        is not kept any more the rest is played, or nothing."""
+        source, loop = self._source, self._loop
+        if loop is None or not (begin or source.step >= loop[1]):
+            return False
+        first = max(loop[0], source.reach.first)
+        self._loop = (first, loop[1]) if first < min(loop[1], source.reach.last) else None
+        if self._loop is not None:
+            source.go(first)
+            self._ended = False
+        return self._loop is not None
 
     def _measure(self, typed: Typed) -> None:
         """Have these measures followed. Raises SourceError where a recording does not tell what one reads."""
@@ -395,7 +427,8 @@ class Run:
         due = math.inf if self._target is not None else self._clock.due(begun)
         made = 0
         while made < due:
-            if not self._source.advance():
+            looped = self._target is None and self._loop_back()
+            if not looped and not self._source.advance():
                 if self._source.capabilities.arrives:
                     self._clock.start(begun)
                 else:
@@ -438,6 +471,7 @@ class Run:
             backend=source.backend,
             futures=source.futures.all,
             measures=self._typed.told,
+            loop=self._loop,
         )
         seen = source.seen()
         glance, reach = self._view.glance(seen), source.reach

@@ -39,7 +39,7 @@ export function followKeys(keys) {
 const GROUPS = [
   [
     'transport',
-    [' ', 'ArrowRight', 'ArrowLeft', 'Home', 'e', 'E', 'b', '<', '>'],
+    [' ', 'ArrowRight', 'ArrowLeft', 'Home', 'e', 'E', 'b', 'L', '<', '>'],
     [
       ['drag the timeline', 'go to a step'],
       ['wheel over the timeline', 'show more of the past, or less'],

@@ -22,6 +22,7 @@ import { followFingers } from './pinch.js';
 import { Placing } from './place.js';
 import { Pointer } from './pointer.js';
 import { Link } from './protocol.js';
+import { Range } from './range.js';
 import { Refusal } from './refusal.js';
 import { download, savePng } from './save.js';
 import { say } from './say.js';
@@ -154,6 +155,9 @@ const link = new Link({
   left(traces) {
     strips.left = traces;
   },
+  pairs(traces) {
+    strips.pairs(traces);
+  },
   raster(raster) {
     strips.raster(raster);
   },
@@ -181,6 +185,7 @@ const link = new Link({
       turning.status(message);
       undo.status(message);
       placing.status(message);
+      range.status(message);
       strips.owner = message.owner;
       strips.measures(message.measures);
     } else if (message.type === 'values') attention.take(message);
@@ -221,6 +226,7 @@ const beside = new Beside();
 const notFinite = new NotFinite(link, attention, part);
 const outline = new Outline(attention, beside, part, (id) => go(id));
 const scrubber = new Scrubber(link, part, redraw);
+const range = new Range(link, scrubber, part, redraw);
 const axis = new Axis(scrubber, part);
 const strips = new Strips(link, attention, beside, scrubber, axis, part('strips'), part('under'));
 const measuring = new Measuring(link, strips, part);
@@ -360,6 +366,7 @@ Object.assign(controls.keys, {
   g: ['each group as one node, with the pathways between them, and back', () => turning.appearance.toggle()],
   c: ['add a curve by its name, or by a measure', () => measuring.toggle()],
   p: ['pin the curve of what is held, or unpin it', () => strips.toggle()],
+  L: ['play the steps that are shown over and over, or go on', () => range.toggle()],
   '<': ['show more of the past', () => scrubber.more(1)],
   '>': ['show less of the past', () => scrubber.more(-1)],
   Escape: [

@@ -49,7 +49,7 @@ import { isStill } from './camera.js';
  * @typedef {{number: number, at: number, last: number, turned: Turned[], within: Future[]}} Future */
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
  *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
- *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[], measures: {number: number, text: string}[]}} Status */
+ *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[], measures: {number: number, text: string}[], loop: number[] | null}} Status */
 /** What is not finite: the first, since which step, or an earlier one that is not known, and how many are; '' where nothing is.
  * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
@@ -62,7 +62,7 @@ import { isStill } from './camera.js';
  *   | {type: 'measured', text: string, findings: {start: number, end: number, message: string, hint: string}[]}
  *   | {type: 'refused', reason: string}} Message */
 /** @typedef {{scene: (scene: Scene) => void, frame: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
- *   left: (traces: Traces) => void,
+ *   left: (traces: Traces) => void, pairs: (traces: Traces) => void,
  *   raster: (raster: Raster) => void, held: (told: Told) => void,
  *   text: (message: Message) => void, link: (open: boolean) => void}} Listener */
 
@@ -77,6 +77,7 @@ const SCENE = 1,
   HELD = 7,
   KIND = 28,
   SUMS = 8,
+  PAIRS = 11,
   HEAD = 40;
 
 /** Unpack what is compressed behind a head. @param {ArrayBuffer} buffer */
@@ -295,6 +296,8 @@ export class Link {
       this.listener.traces(unpackTraces(data, this.scene));
     } else if (kind === LEFT && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.left(unpackTraces(data, this.scene));
+    } else if (kind === PAIRS && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
+      this.listener.pairs(unpackTraces(data, this.scene));
     } else if (kind === RASTER && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.raster(unpackRaster(data, this.scene));
     } else if (

@@ -35,6 +35,8 @@ export class Scrubber {
     /** @type {number[]} */
     this.known = [];
     this.drawn = '';
+    /** the steps that are shown alone, where some are @type {number[] | null} */
+    this.range = null;
     this.scrub.oninput = () => this.seek(Number(this.scrub.value));
     this.span.onchange = changed;
     this.changed = changed;
@@ -101,7 +103,12 @@ export class Scrubber {
       { scrub } = this;
     const coming = this.known.filter((turn) => turn > step + 1 && turn <= last);
     this.known = [...new Set([...this.turned, ...coming])];
-    if (!scrub.matches(':active')) {
+    if (this.range && (this.range[0] >= last || this.range[1] <= first)) this.range = null;
+    if (this.range) {
+      [this.low, this.high] = [Math.max(first, this.range[0]), Math.min(last, this.range[1])];
+      [scrub.min, scrub.max] = [String(this.low), String(this.high)];
+      if (document.activeElement !== scrub || performance.now() - this.sought > KEPT) scrub.value = String(step);
+    } else if (!scrub.matches(':active')) {
       const low = this.high - span,
         inside = (step > low || step === first) && step < this.high;
       if (step === last || last - first <= span) this.high = last;
@@ -114,6 +121,7 @@ export class Scrubber {
     scrub.setAttribute('aria-valuetext', `step ${step} of ${last}, back to ${first}`);
     const words = `back to ${first}`;
     if (this.reach.textContent !== words) this.reach.textContent = words;
+    this.cursor.hidden = step < this.low || step > this.high;
     const { offsetLeft, offsetWidth } = /** @type {HTMLElement} */ (scrub.parentElement);
     const at = offsetLeft + THUMB + this.across(step) * (offsetWidth - 2 * THUMB);
     this.cursor.style.transform = `translateX(${at.toFixed(1)}px)`;

@@ -3,6 +3,7 @@
  */
 
 import { signed } from './attention.js';
+import { again, COLOURS, offer, plane, taken } from './joining.js';
 import { namesOf } from './protocol.js';
 import { THUMB } from './scrubber.js';
 
@@ -15,11 +16,12 @@ import { THUMB } from './scrubber.js';
 /** @typedef {import('./protocol.js').Raster} Raster */
 /** @typedef {import('./protocol.js').Traces} Traces */
 /** @typedef {import('./scrubber.js').Scrubber} Scrubber */
+/** @typedef {import('./joining.js').Joined} Joined */
 /** The ranges of a trace. @typedef {{trace: Float32Array, first: number, every: number}} Seen */
 /** What it shows of a neuron or a connection: its activity or weight where `what` is empty; `key` is what that is asked by,
  * `told` what it is called; behind it, in the same axis, `behind`; `names` and `seen` are the names
- * of all of these, and their ranges.
- * @typedef {{id: string, what: string, key: string, told: string, behind: string[], names: string[], seen: Seen[], data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
+ * of all of these, and their ranges. Signals that are `joined` have the same axis; `against` another it is drawn in a plane.
+ * @typedef {{id: string, what: string, key: string, told: string, behind: string[], names: string[], seen: Seen[], joined: Joined[], against: Joined | null, join: HTMLSelectElement, data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
  *   canvas: HTMLCanvasElement, ends: HTMLElement[], pin: HTMLButtonElement, parts: HTMLElement[]}} Strip */
 
 /** What a model with a spike block has, 1 in the steps in which it fires. */
@@ -74,6 +76,9 @@ export class Strips {
     this.waiting = false;
     /** how the future went that was left last @type {Traces | null} */
     this.left = null;
+    /** the values of what is drawn in planes, and those of now that are drawn in them @type {Traces | null} */
+    this.paired = null;
+    this.pointed = attention.values;
     this.timer = 0;
     this.of(this.held, undefined);
     this.list();
@@ -84,6 +89,7 @@ export class Strips {
     const name = element('button', 'of'),
       value = element('span', 'now'),
       choice = element('select', 'what'),
+      join = element('select', 'what join'),
       label = element('div', 'label');
     const canvas = element('canvas', 'trace'),
       ends = [element('span', 'end'), element('span', 'end')];
@@ -99,6 +105,9 @@ export class Strips {
       behind: [],
       names: [],
       seen: [],
+      joined: [],
+      against: null,
+      join,
       data: '',
       name,
       choice,
@@ -108,7 +117,8 @@ export class Strips {
       pin,
       parts: [label, canvas, scale],
     };
-    label.append(name, choice, value);
+    label.append(name, choice, value, join);
+    join.onchange = () => this.join(strip, join.value);
     numbers.append(...ends);
     scale.append(numbers, pin);
     canvas.setAttribute('role', 'img');
@@ -123,6 +133,7 @@ export class Strips {
     };
     canvas.onpointerleave = () => this.point(null);
     canvas.onpointerdown = canvas.onpointermove = (/** @type {PointerEvent} */ event) => {
+      if (strip.against || event.shiftKey) return;
       this.point(event.offsetX);
       if (event.buttons !== 1 || this.scrubber.scrub.disabled) return;
       canvas.setPointerCapture(event.pointerId);
@@ -164,6 +175,23 @@ export class Strips {
     this.met = new Set(ids);
     for (const id of fresh) this.pin(id);
     if (!fresh.length) this.list();
+  }
+
+  /** Show another signal in the same axis, or in a plane, or each by itself again. @param {Strip} strip @param {string} how */
+  join(strip, how) {
+    const [verb, place] = how.split(' '),
+      other = [...this.pinned, this.held][Number(place)],
+      apart = strip.joined;
+    if (verb === 'with' && other) {
+      strip.joined = [...strip.joined, taken(other), ...other.joined];
+      this.pinned = this.pinned.filter((one) => one !== other);
+    } else if (verb === 'against' && other) strip.against = taken(other);
+    else if (verb === 'apart') strip.joined = [];
+    else if (verb === 'time') strip.against = null;
+    this.of(strip, this.group(strip.id), strip.what, { items: ['', ...strip.behind], names: strip.names });
+    if (verb === 'apart') for (const { id, what, key } of apart) this.toggle({ id, what, key });
+    this.list();
+    strip.join.focus();
   }
 
   /** Pin the strips that a page begins with, as far as there is room for them. @param {Curve[]} curves */
@@ -214,7 +242,11 @@ export class Strips {
     strip.told = strip.what === RASTER ? `the group of ${called}` : strip.what ? `${called}, ${strip.what}` : called;
     strip.behind = curve.items.slice(1);
     strip.names = [strip.what && strip.what !== RASTER ? `${called}.${strip.what}` : called, ...curve.names.slice(1)];
-    if (strip.behind.length) strip.told = curve.names.join(' and ');
+    strip.names.splice(1 + strip.behind.length);
+    strip.names.push(...strip.joined.map(({ name: one }) => one));
+    if (strip.names.length > 1) strip.told = strip.names.join(' and ');
+    if (strip.against) strip.told = `${strip.names[0]} against ${strip.against.name}`;
+    strip.canvas.classList.toggle('plane', strip.against !== null);
     const again = !isPinned && this.pinned.some(({ key }) => key === strip.key);
     const first = group?.data.neuron === undefined ? 'weight' : (group.data.state ?? 'activity');
     strip.choice.replaceChildren(
@@ -226,11 +258,20 @@ export class Strips {
     strip.choice.setAttribute('aria-label', `what is shown of ${called}`);
     strip.name.textContent = called;
     strip.name.title = called;
-    for (const other of curve.names.slice(1)) {
+    for (const other of curve.names.slice(1, 1 + strip.behind.length)) {
       const behind = element('span', 'behind');
       behind.textContent = other;
       strip.name.append(behind);
     }
+    for (const [at, other] of strip.joined.entries()) {
+      const joined = element('span', 'joined');
+      joined.textContent = other.name;
+      joined.style.borderColor = COLOURS[at % COLOURS.length];
+      strip.name.append(joined);
+    }
+    if (strip.against) strip.name.append(` against ${strip.against.name}`);
+    strip.name.title = strip.told;
+    strip.join.setAttribute('aria-label', `show ${called} with another, or against it`);
     strip.pin.textContent = isPinned ? '×' : 'pin';
     strip.pin.setAttribute('aria-label', `${isPinned ? 'unpin' : 'pin'} ${strip.told}`);
     strip.pin.hidden = again || (!isPinned && this.pinned.length >= PINS);
@@ -253,6 +294,8 @@ export class Strips {
       curves = this.link.scene?.curves ?? [];
     this.pinned = this.pinned.filter((strip) => {
       const same = groups.find(({ data }) => JSON.stringify(data) === strip.data);
+      strip.joined = again(strip.joined, groups);
+      [strip.against = null] = again(strip.against ? [strip.against] : [], groups);
       if (same)
         this.of(
           strip,
@@ -263,7 +306,7 @@ export class Strips {
       return same;
     });
     this.of(this.held, this.attention.groups.get(this.held.id), this.held.what);
-    this.waiting = false;
+    [this.waiting, this.paired] = [false, null];
     this.list();
   }
 
@@ -304,16 +347,27 @@ export class Strips {
 
   /** Have the values of what is shown asked for. */
   want() {
-    this.attention.also = this.traced().flatMap(({ key, behind }) => [key, ...behind]);
+    const all = [...this.pinned, this.held];
+    this.attention.also = [
+      ...this.traced().flatMap((strip) => this.keys(strip)),
+      ...all.flatMap(({ key, against }) => (against ? [key, against.key] : [])),
+    ];
+  }
+
+  /** By what all is asked for that a strip shows over time. @param {Strip} strip */
+  keys({ key, behind, joined }) {
+    return [key, ...behind, ...joined.map((one) => one.key)];
   }
 
   /** The strips that show traces. */
   traced() {
-    return [...this.pinned, this.held].filter(({ what }) => what !== RASTER);
+    return [...this.pinned, this.held].filter(({ what, against }) => what !== RASTER && !against);
   }
 
   /** Show the strips that there are. */
   list() {
+    for (const strip of this.pinned) offer(strip, [...this.pinned, this.held]);
+    this.held.join.hidden = true;
     this.want();
     this.attention.ask();
     const focused = /** @type {HTMLElement} */ (document.activeElement);
@@ -329,16 +383,16 @@ export class Strips {
     const { low, high, events, known: turned } = this.scrubber,
       width = Math.max(1, this.held.canvas.clientWidth - 2 * THUMB);
     const traced = this.traced(),
-      others = [...this.pinned, this.held].filter((strip) => !traced.includes(strip));
-    const items = [...new Set(traced.flatMap((strip) => [strip.key, this.marks(strip), ...strip.behind]))].filter(
-        Boolean,
-      ),
+      others = [...this.pinned, this.held].filter(({ what }) => what === RASTER),
+      pairs = [...new Set(this.pinned.flatMap(({ key, against }) => (against ? [key, against.key] : [])))];
+    const items = [...new Set(traced.flatMap((strip) => [this.marks(strip), ...this.keys(strip)]))].filter(Boolean),
       rasters = [...new Set(others.map(({ id }) => id))].slice(0, PINS);
     for (const { key, value } of [...this.pinned, this.held]) {
       const now = this.attention.values[key],
         words = key && now !== undefined ? signed(now) : '';
       if (value.textContent !== words) value.textContent = words;
     }
+    if (this.paired && this.pointed !== this.attention.values) this.pairs(this.paired);
     const every = Math.max(1, Math.ceil((high - low + 1) / Math.min(width, 2000))),
       now = performance.now();
     const first = Math.floor(low / every) * every;
@@ -353,8 +407,10 @@ export class Strips {
       ...items,
       '/',
       ...rasters,
+      '/',
+      ...pairs,
     ].join(' ');
-    if (!(items.length || rasters.length) || wanted === this.asked) return;
+    if (!(items.length || rasters.length || pairs.length) || wanted === this.asked) return;
     const wait = this.when + (this.waiting ? LOST : PACE) - now;
     clearTimeout(this.timer);
     if (wait > 0) {
@@ -362,7 +418,7 @@ export class Strips {
       return;
     }
     [this.asked, this.when, this.waiting] = [wanted, now, true];
-    const more = rasters.length ? { rasters } : {};
+    const more = { ...(rasters.length ? { rasters } : {}), ...(pairs.length ? { pairs } : {}) };
     this.link.ask('trace', { items, first, every, bins: Math.floor((high - first) / every) + 1, ...more });
   }
 
@@ -372,11 +428,19 @@ export class Strips {
     for (const strip of [...this.pinned, this.held]) {
       const trace = traces.ranges.get(strip.key);
       const behind = strip.behind.flatMap((key) => traces.ranges.get(key) ?? []);
+      const joined = strip.joined.flatMap(({ key }) => traces.ranges.get(key) ?? []);
       const left = this.left?.ranges.get(strip.key);
-      if (trace) this.paint(strip, trace, traces, { behind, left }, traces.ranges.get(this.marks(strip)));
+      if (trace && !strip.against)
+        this.paint(strip, trace, traces, { behind, joined, left }, traces.ranges.get(this.marks(strip)));
     }
     this.left = null;
     this.show();
+  }
+
+  /** Values of each step have come, or others are those of now. @param {Traces | null} traces */
+  pairs(traces) {
+    [this.paired, this.pointed] = [traces, this.attention.values];
+    if (traces) for (const strip of this.pinned) plane(strip, traces, this.attention.values);
   }
 
   /** A raster has come. @param {Raster} raster */
@@ -421,16 +485,16 @@ export class Strips {
   /** Draw a trace: a line, up and down in each bin where it has several steps; above it marks where it fires, unless the
    * trace itself shows that; behind it, wide and pale, others, and, pale, how the future went that was left.
    * @param {Strip} strip @param {Float32Array} trace
-   * @param {Traces} traces @param {{behind: Float32Array[], left: Float32Array | undefined}} others @param {Float32Array} [spikes] */
-  paint(strip, trace, { first, every }, { behind, left }, spikes) {
-    strip.seen = [trace, ...behind].map((one) => ({ trace: one, first, every }));
+   * @param {Traces} traces @param {{behind: Float32Array[], joined: Float32Array[], left: Float32Array | undefined}} others @param {Float32Array} [spikes] */
+  paint(strip, trace, { first, every }, { behind, joined, left }, spikes) {
+    strip.seen = [trace, ...behind, ...joined].map((one) => ({ trace: one, first, every }));
     const { canvas } = strip,
       [context, x] = this.blank(canvas);
     const { clientWidth: width, clientHeight: height } = canvas,
       style = getComputedStyle(canvas),
       { scrubber } = this;
     let [low, high] = [Infinity, -Infinity];
-    for (const one of [trace, ...behind, ...(left ? [left] : [])]) {
+    for (const one of [trace, ...behind, ...joined, ...(left ? [left] : [])]) {
       for (const value of one) {
         if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
       }
@@ -485,6 +549,11 @@ export class Strips {
     }
     context.globalAlpha = 1;
     context.lineWidth = 1.2;
+    for (const [at, other] of joined.entries()) {
+      context.strokeStyle = COLOURS[at % COLOURS.length];
+      follow(context, other, middle, y);
+    }
+    context.strokeStyle = style.color;
     follow(context, trace, middle, y);
     const went = left?.some(Number.isFinite) ? ', behind it how it went before' : '';
     canvas.setAttribute(
