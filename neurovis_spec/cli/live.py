@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from neurovis_spec.compiled import CompiledNetwork
+    from neurovis_spec.live.access import Access
     from neurovis_spec.live.desk import Desk, Written
     from neurovis_spec.live.live import Edited
     from neurovis_spec.live.run import Run
@@ -98,6 +99,7 @@ door_options: Final = as_one(
 
 @click.command(
     epilog=examples(
+        "neurovis live",
         "neurovis live first.yaml",
         "neurovis live first.yaml --watch --open",
         "neurovis live first.yaml --recording first.npz",
@@ -105,7 +107,7 @@ door_options: Final = as_one(
         "neurovis live first.yaml --from first.npz --only weights",
     )
 )
-@click.argument("specs", metavar="SPEC", nargs=-1, required=True, shell_complete=paths)
+@click.argument("specs", metavar="[SPEC]", nargs=-1, shell_complete=paths)
 @played_options
 @click.option("--watch", is_flag=True, help="Show the spec anew whenever it, or a file that it names, is saved.")
 @door_options
@@ -116,23 +118,29 @@ door_options: Final = as_one(
 def command(
     specs: tuple[str, ...], played: Played, watch: bool, door: Door, drawn: Drawn, settings: dict[str, float | str]
 ) -> None:
-    """Show a network in the browser while it runs.
+    """Show a network in the browser while it runs; without SPEC a gallery to choose from.
 
     One line on standard output is the URL of the page, with the token that opens it. The network runs in real time by
-    its dt, goes on past time.steps, and can be stopped, stepped back and turned in the page. Ctrl-C ends it.
+    its dt, goes on past time.steps, and can be stopped, stepped back and turned in the page. Ctrl-C ends it. The
+    gallery has the examples, and the specs in this folder and those within it.
     """
     if len(specs) > 1:
         raise click.UsageError(f"live shows one network, and {len(specs)} specs are given: start it once for each")
     if played.recording is not None and played.start is not None:
         raise click.UsageError("--from begins a run, and --recording plays one that was made: give one of them")
     check_only(played.only, played.start)
-    (spec,) = specs
+    spec = specs[0] if specs else None
+    if spec is None:
+        _check_alone(played, watch, settings)
     if watch and spec == "-":
         raise click.UsageError("standard input cannot be watched: give the path of a spec")
     if find_spec("aiohttp") is None:
         raise fault(
             "the live view needs aiohttp", "pip install 'neurovis-spec[live]'; in a clone: pip install '.[live]'"
         )
+    if spec is None:
+        _show_gallery(drawn, door)
+        return
     from neurovis_spec.live.desk import Written
     from neurovis_spec.live.live import Edited
     from neurovis_spec.live.show import Beginning, Show
@@ -142,6 +150,30 @@ def command(
     begin = Beginning(recording_of(played.start), played.only is not None)
     show = Show(recording, begin, drawn.theme, drawn.engine, drawn.backend)
     _show(network, show, in_place, Edited(Path(spec), compiler(spec, settings)) if watch else None, door)
+
+
+def _check_alone(played: Played, watch: bool, settings: dict[str, float | str]) -> None:
+    """Refuse what only means something of one spec."""
+    given = {"--recording": played.recording, "--from": played.start, "--watch": watch, "--set": settings}
+    for option, value in given.items():
+        if value:
+            raise click.UsageError(f"{option} is of a spec: give one, or leave the option out for the gallery")
+
+
+def _show_gallery(drawn: Drawn, door: Door) -> None:
+    from neurovis_spec.cli.gallery import show_gallery
+    from neurovis_spec.live.access import PAGE, PICTURE, STREAM, Access
+    from neurovis_spec.live.show import Show
+
+    sock = bound(door.host, door.port)
+    access = Access(door.host, sock.getsockname()[1], door.viewers, (PAGE, STREAM, PICTURE))
+    sys.setswitchinterval(0.0005)
+    show_gallery(
+        Show(None, theme=drawn.theme, engine=drawn.engine, backend=drawn.backend),
+        access,
+        sock,
+        announcing(access, door),
+    )
 
 
 def _network(
@@ -179,6 +211,21 @@ def _show(network: CompiledNetwork, show: Show, in_place: Written | None, edited
     sock = bound(door.host, door.port)
     access = Access(door.host, sock.getsockname()[1], door.viewers)
 
+    def desk(run: Run, tell: Callable[[str], None]) -> Desk:
+        return Desk(network, show.engine, show.view, run, tell, in_place)
+
+    def edits(run: Run, tell: Callable[[str], None], desk: Desk) -> Watch:
+        assert edited is not None
+        return Edits(show, edited, run, tell, desk).watch()
+
+    # frames are due 60 times a second: threads must not wait for each other as long as Python lets them
+    sys.setswitchinterval(0.0005)
+    asyncio.run(serve(stage, sock, access, announcing(access, door), desk, None if edited is None else edits))
+
+
+def announcing(access: Access, door: Door) -> Callable[[], None]:
+    """What tells where the page is."""
+
     def announce() -> None:
         click.echo(access.url())
         sys.stdout.flush()
@@ -189,16 +236,7 @@ def _show(network: CompiledNetwork, show: Show, in_place: Written | None, edited
 
             webbrowser.open(access.url())
 
-    def desk(run: Run, tell: Callable[[str], None]) -> Desk:
-        return Desk(network, show.engine, show.view, run, tell, in_place)
-
-    def edits(run: Run, tell: Callable[[str], None], desk: Desk) -> Watch:
-        assert edited is not None
-        return Edits(show, edited, run, tell, desk).watch()
-
-    # frames are due 60 times a second: threads must not wait for each other as long as Python lets them
-    sys.setswitchinterval(0.0005)
-    asyncio.run(serve(stage, sock, access, announce, desk, None if edited is None else edits))
+    return announce
 
 
 def bound(host: str, port: int) -> socket.socket:

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+import shlex
+from collections.abc import Mapping
 from importlib.resources import files as package_files
-from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
 
 import click
 
+from neurovis_spec.cli.examples import examples_at_hand, starts
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import check_target, writing
 from neurovis_spec.cli.options import examples, listed
-
-if TYPE_CHECKING:
-    from neurovis_spec.manual.networks import Start
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 _NAME_LINE = re.compile(r"^name:[^\n]*$", re.MULTILINE)
@@ -24,39 +21,14 @@ _DATA_FILE = re.compile(r"\b(?:file|mujoco): *([^\s,}\]]+)")
 _INCLUDED = re.compile(r"^include: *\[([^\]]*)\]", re.MULTILINE)
 
 
-def example_folder() -> Traversable:
-    """Where the examples are: in an installed package beside the code, in a checkout in ``specs/``."""
-    package = package_files("neurovis_spec")
-    inside = package.joinpath("examples")
-    return inside if inside.is_dir() else Path(str(package)).parent / "specs"
-
-
-def examples_at_hand() -> Mapping[str, Traversable]:
-    """The examples by name, with the folder of each: that of all, or one of its own with the same name."""
-    folder = example_folder()
-    found: dict[str, Traversable] = {}
-    for entry in folder.iterdir() if folder.is_dir() else ():
-        if entry.name.endswith(".yaml"):
-            found[entry.name.removesuffix(".yaml")] = folder
-        elif entry.is_dir() and entry.joinpath(f"{entry.name}.yaml").is_file():
-            found[entry.name] = entry
-    return dict(sorted(found.items()))
-
-
-def _starts() -> Iterable[Start]:
-    from neurovis_spec.manual.networks import starts
-
-    return starts()
-
-
 def _listed() -> tuple[str, ...]:
     """The names of the examples, then those of the manual's networks to start from."""
-    return *examples_at_hand(), *(one.name for one in _starts())
+    return *examples_at_hand(), *(one.name for one in starts())
 
 
 def _known() -> tuple[str, ...]:
     """The same, with what else finds the networks of the manual."""
-    return *_listed(), *(called for one in _starts() for called in one.called)
+    return *_listed(), *(called for one in starts() for called in one.called)
 
 
 @click.command(epilog=examples("neurovis new first", "neurovis new walking --from cpg_rbf", "neurovis new --from list"))
@@ -71,10 +43,13 @@ def _known() -> tuple[str, ...]:
     text="Copy an example with its data and included files, or a network to start from of the manual (force); 'list' "
     "shows which there are.",
 )
-def command(name: str, example: str | None) -> None:
+@click.option("--open", "browse", is_flag=True, help="Run it at once, and open its page in the browser.")
+@click.pass_context
+def command(context: click.Context, name: str, example: str | None, browse: bool) -> None:
     """Write a commented starter spec NAME.yaml, or a copy of an example.
 
-    An example with a folder of its own gets one, NAME/NAME.yaml. Nothing is overwritten.
+    An example with a folder of its own gets one, NAME/NAME.yaml. Nothing is overwritten. What shows it in the
+    browser is said on standard error.
     """
     target = Path(name.removesuffix(".yaml") + ".yaml")
     if not _NAME.fullmatch(target.stem):
@@ -85,7 +60,7 @@ def command(name: str, example: str | None) -> None:
         text = package_files("neurovis_spec.cli").joinpath("starter.yaml").read_text(encoding="utf-8")
         wanted = {target: text.replace("starter.", f"{target.stem}.").encode()}
     elif example not in examples_at_hand():
-        (text,) = (one.spec for one in _starts() if example in (one.name, *one.called))
+        (text,) = (one.spec for one in starts() if example in (one.name, *one.called))
         wanted = {target: text.encode()}
     else:
         if examples_at_hand()[example].name == example:  # a folder of its own
@@ -93,6 +68,12 @@ def command(name: str, example: str | None) -> None:
         wanted = copies(example, target)
     wanted[target] = _NAME_LINE.sub(f"name: {target.stem}", wanted[target].decode(), count=1).encode()
     write_new(wanted, target)
+    if browse:
+        from neurovis_spec.cli.live import command as live
+
+        live.main([str(target), "--open"], prog_name="neurovis live", standalone_mode=False, parent=context.parent)
+    else:
+        click.echo(f"see it run: {shlex.join(['neurovis', 'live', str(target), '--open'])}", err=True)
 
 
 def copies(example: str, target: Path) -> dict[Path, bytes]:

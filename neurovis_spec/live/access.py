@@ -15,6 +15,8 @@ from typing import Final
 
 #: The paths that there are: the page, and its websocket.
 PAGE, STREAM = "/", "/live"
+#: What a gallery has besides: a picture of what it lists.
+PICTURE: Final = "/picture"
 _WILD: Final = ("0.0.0.0", "::", "")
 
 
@@ -37,6 +39,7 @@ class Access:
     host: str
     port: int
     viewers: bool = False
+    paths: tuple[str, ...] = (PAGE, STREAM)
     owner: str = field(default_factory=_token)
     viewer: str = field(default_factory=_token)
 
@@ -64,7 +67,7 @@ class Access:
             return Refused(403, "the Origin is not this server's")
         if self.of(token) is None:
             return Refused(403, "the token is missing or wrong: open the URL that 'neurovis live' has printed")
-        if path not in (PAGE, STREAM):
+        if path not in self.paths:
             return Refused(404, "there is nothing at this path")
         if method != "GET":
             return Refused(405, "only GET is answered")

@@ -140,7 +140,7 @@ async def serve(
     """Serve until a signal asks for an end. Raises Ended."""
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[int] = loop.create_future()
-    _heed_signals(loop, ended)
+    heed_signals(loop, ended)
     await serve_until(ended, stage, sock, access, announce, desk, edits)
     raise Ended(ended.result())
 
@@ -179,7 +179,7 @@ async def serve_until(
         await server.stop()
 
 
-def _heed_signals(loop: asyncio.AbstractEventLoop, ended: asyncio.Future[int]) -> None:
+def heed_signals(loop: asyncio.AbstractEventLoop, ended: asyncio.Future[int]) -> None:
     """Let the signals that would end the process end the server, those that are not ignored."""
 
     def end(number: int) -> None:

@@ -12,11 +12,15 @@ import hashlib
 import re
 import socket
 import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
 from weakref import WeakSet
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from neurovis_spec.live.access import PAGE, Access
+from neurovis_spec.live.access import STREAM, Access, Refused
 from neurovis_spec.live.commands import Present
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import Client, Hub, Reception
@@ -28,6 +32,7 @@ from neurovis_spec.live.shipped import page
 MOST_CLIENTS, MOST_CONNECTIONS = 128, 256
 #: Seconds in which a connection must have asked for something, a message must be on its way, and between pings.
 ASKING, SENDING, PINGS = 10.0, 15.0, 20.0
+_POLICY: Final = "Content-Security-Policy"
 #: Messages a second that a client may send in the long run, and at once.
 RATE, BURST = 200, 400
 
@@ -49,7 +54,7 @@ def policy(html: str) -> str:
 def headers(csp: str) -> dict[str, str]:
     """What every answer carries."""
     return {
-        "Content-Security-Policy": csp,
+        _POLICY: csp,
         "X-Content-Type-Options": "nosniff",
         "X-Frame-Options": "DENY",
         "Referrer-Policy": "no-referrer",
@@ -61,12 +66,22 @@ def headers(csp: str) -> dict[str, str]:
     }
 
 
-class Server:
-    """Serves a run to whoever has a token; with a ``desk`` neurons can be put by hand, and files saved."""
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a websocket looks on: whose hub it joins, what takes its messages, and what is called when it has come and
+    when it has gone."""
 
-    def __init__(self, access: Access, hub: Hub, run: Run, desk: Desk | None = None) -> None:
-        self._access, self._hub, self._run = access, hub, run
-        self._reception = Reception(hub, run, desk)
+    hub: Hub
+    take: Callable[[Client, bytes | str], None]
+    come: Callable[[], object]
+    gone: Callable[[], object]
+
+
+class Front(ABC):
+    """Answers requests of whoever has a token, with pages and websockets, and refuses all others."""
+
+    def __init__(self, access: Access) -> None:
+        self._access = access
         self._html = page()
         self._headers = headers(policy(self._html))
         self._streams: WeakSet[web.WebSocketResponse] = WeakSet()
@@ -79,6 +94,14 @@ class Server:
             self._app, access_log=None, keepalive_timeout=15.0, handle_signals=False, shutdown_timeout=1.0
         )
         self._listening: asyncio.Server | None = None
+
+    @abstractmethod
+    async def _get(self, request: web.Request) -> web.StreamResponse:
+        """Answer a request that is no websocket, of somebody who has a token."""
+
+    @abstractmethod
+    def _place(self, request: web.Request) -> Place | Refused:
+        """Where a websocket looks on."""
 
     async def start(self, sock: socket.socket) -> None:
         """Listen at a socket that is bound."""
@@ -112,7 +135,8 @@ class Server:
                 protocol.transport.abort()
 
     async def _prepare(self, request: web.Request, response: web.StreamResponse) -> None:
-        response.headers.update(self._headers)
+        own = response.headers.get(_POLICY)  # of another page than that of a run
+        response.headers.update(self._headers if own is None else {**self._headers, _POLICY: own})
 
     async def _answer(self, request: web.Request) -> web.StreamResponse:
         self._silent.discard(request.protocol)
@@ -121,11 +145,14 @@ class Server:
         refused = self._access.refusal(request.method, request.path, head.get("Host"), head.get("Origin"), token)
         if refused is not None:
             return self._refuse(refused.status, refused.reason)
-        if request.path == PAGE:
-            response = web.Response(text=self._html, content_type="text/html", charset="utf-8")
-            response.enable_compression()
-            return response
-        return await self._stream(request, bool(self._access.of(token)))
+        if request.path == STREAM:
+            return await self._stream(request, bool(self._access.of(token)))
+        return await self._get(request)
+
+    def _live_page(self) -> web.Response:
+        response = web.Response(text=self._html, content_type="text/html", charset="utf-8")
+        response.enable_compression()
+        return response
 
     @staticmethod
     def _refuse(status: int, reason: str) -> web.Response:
@@ -138,37 +165,43 @@ class Server:
         stream = web.WebSocketResponse(max_msg_size=LARGEST, heartbeat=PINGS, compress=False, timeout=1.0)
         if not stream.can_prepare(request):
             return self._refuse(426, "here is a websocket")
-        if len(self._hub) >= MOST_CLIENTS:
+        place = self._place(request)
+        if isinstance(place, Refused):
+            return self._refuse(place.status, place.reason)
+        if len(place.hub) >= MOST_CLIENTS:
             return self._refuse(503, f"{MOST_CLIENTS} clients look on already")
         client = Client(owner)
-        self._hub.join(client)
+        place.hub.join(client)
         writer: asyncio.Task[None] | None = None
         try:
             await stream.prepare(request)
             self._streams.add(stream)
-            self._run.ask(Present())
-            writer = asyncio.create_task(self._write(stream, client, request))
-            await self._read(stream, client)
+            place.come()
+            writer = asyncio.create_task(self._write(stream, client, place.hub, request))
+            await self._read(stream, client, place)
         finally:
-            self._hub.leave(client)
+            place.hub.leave(client)
+            place.gone()
             if writer is not None:
                 writer.cancel()
         return stream
 
-    async def _write(self, stream: web.WebSocketResponse, client: Client, request: web.Request) -> None:
+    @staticmethod
+    async def _write(stream: web.WebSocketResponse, client: Client, hub: Hub, request: web.Request) -> None:
         """Send what there is for a client whenever there is something."""
         try:
             while True:
                 await client.wake.wait()
                 client.wake.clear()
-                for message in list(self._hub.messages(client)):
+                for message in list(hub.messages(client)):
                     async with asyncio.timeout(SENDING):
                         await (stream.send_bytes(message) if isinstance(message, bytes) else stream.send_str(message))
         except (TimeoutError, ConnectionError):
             if request.transport is not None:
                 request.transport.abort()
 
-    async def _read(self, stream: web.WebSocketResponse, client: Client) -> None:
+    @staticmethod
+    async def _read(stream: web.WebSocketResponse, client: Client, place: Place) -> None:
         """Take what a client sends; a message that no page of ours sends ends its connection."""
         left, then = float(BURST), time.monotonic()
         async for message in stream:
@@ -180,10 +213,24 @@ class Server:
                 return
             try:
                 if message.type in (WSMsgType.BINARY, WSMsgType.TEXT):
-                    self._reception.take(client, message.data)
+                    place.take(client, message.data)
             except ProtocolError as error:
                 await stream.close(code=WSCloseCode.POLICY_VIOLATION, message=str(error).encode()[:120])
                 return
+
+
+class Server(Front):
+    """Serves a run to whoever has a token; with a ``desk`` neurons can be put by hand, and files saved."""
+
+    def __init__(self, access: Access, hub: Hub, run: Run, desk: Desk | None = None) -> None:
+        super().__init__(access)
+        self._looked_on = Place(hub, Reception(hub, run, desk).take, lambda: run.ask(Present()), lambda: None)
+
+    async def _get(self, request: web.Request) -> web.StreamResponse:
+        return self._live_page()
+
+    def _place(self, request: web.Request) -> Place | Refused:
+        return self._looked_on
 
 
 class _Closed(asyncio.Protocol):

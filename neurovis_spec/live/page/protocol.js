@@ -233,9 +233,8 @@ export class Link {
 
   /** Connect. */
   open() {
-    const token = new URLSearchParams(location.search).get('token') || '';
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
-    const url = `${scheme}://${location.host}/live?token=${encodeURIComponent(token)}`;
+    const url = `${scheme}://${location.host}/live${location.search}`;
     const socket = location.protocol === 'about:' ? new Handed() : new WebSocket(url);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => {

@@ -1,0 +1,83 @@
+"""Small pictures of specs: each network as it is laid out, before anything happens.
+
+In: what is listed, and what draws it. Out: an SVG, or why there is none, in words. It is kept in the user's cache
+until one of the files that it was made of has another size or date, or the program is another one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from threading import Lock
+from typing import Final, TypeAlias
+
+from neurovis_spec.diagnostics import SpecError, show_text
+from neurovis_spec.live.listing import Listed
+from neurovis_spec.live.watch import marks
+from neurovis_spec.user_cache import UserCache
+from neurovis_spec.version import __version__
+
+KEPT: Final = UserCache("pictures")
+
+
+#: Draws what is listed, and says which files it has read for that. Raises SpecError.
+Draw: TypeAlias = Callable[[Listed], tuple[str, Iterable[Path]]]
+
+
+@dataclass(frozen=True, slots=True)
+class Thumbnail:
+    """A picture, or words in its place."""
+
+    svg: str
+    words: str
+
+
+class Thumbnails:
+    """Makes pictures one after the other, from any thread."""
+
+    def __init__(self, draw: Draw) -> None:
+        self._draw, self._one_by_one = draw, Lock()
+
+    def of(self, listed: Listed) -> Thumbnail:
+        """The picture of a spec."""
+        with self._one_by_one:
+            key = json.dumps([_program(), str(listed.path), listed.text])
+            known = _known(key)
+            if known is not None:
+                return known
+            try:
+                svg, files = self._draw(listed)
+            except SpecError as error:
+                return Thumbnail("", show_text(error.diagnostics, error.sources))
+            except Exception as error:  # a layout engine, ours or anybody's, may fail
+                return Thumbnail("", f"{type(error).__name__}: {error}")
+            now = [[str(path), mark] for path, mark in sorted(marks(files).items())]
+            KEPT.keep(key, json.dumps([now, svg]).encode())
+            return Thumbnail(svg, "")
+
+
+def _known(key: str) -> Thumbnail | None:
+    """The picture that was kept, where all that it was made of is as it was."""
+    data = KEPT.read(key)
+    if data is None:
+        return None
+    try:
+        then, svg = json.loads(data)
+        found = marks(Path(path) for path, _ in then)
+        same = all(mark is not None and found[Path(path)] == tuple(mark) for path, mark in then)
+    except (ValueError, TypeError, KeyError):
+        return None
+    return Thumbnail(svg, "") if same and isinstance(svg, str) else None
+
+
+@cache
+def _program() -> str:
+    """The size and the date of all of the program."""
+    here = Path(__file__).parents[1]
+    found = marks([*here.rglob("*.py"), *here.rglob("*.yaml")])
+    stamps = repr(sorted((str(path), mark) for path, mark in found.items()))
+    return f"{__version__} {hashlib.sha256(stamps.encode()).hexdigest()}"
