@@ -15,6 +15,7 @@ from test_live_server import Eyes
 
 from neurovis_spec import user_cache
 from neurovis_spec.cli import gallery as commands
+from neurovis_spec.cli import new
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.live import listing, rooms
 from neurovis_spec.live.access import PAGE, PICTURE, STREAM, Access
@@ -170,6 +171,7 @@ def test_the_command_line_has_it_and_a_new_spec_says_how_to_see_it(
     refused = CliRunner().invoke(neurovis, ["live", "--watch"])
     assert refused.exit_code == 2
     assert "--watch is of a spec" in refused.stderr
+    monkeypatch.setattr(new, "on_terminal", lambda: True)
     made = CliRunner().invoke(neurovis, ["new", "first"])
     assert (made.stdout, made.stderr) == ("first.yaml\n", "see it run: neurovis live first.yaml --open\n")
 

@@ -14,6 +14,7 @@ from neurovis_spec.cli.examples import examples_at_hand, starts
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import check_target, writing
 from neurovis_spec.cli.options import examples, listed
+from neurovis_spec.cli.progress import on_terminal
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 _NAME_LINE = re.compile(r"^name:[^\n]*$", re.MULTILINE)
@@ -48,8 +49,8 @@ def _known() -> tuple[str, ...]:
 def command(context: click.Context, name: str, example: str | None, browse: bool) -> None:
     """Write a commented starter spec NAME.yaml, or a copy of an example.
 
-    An example with a folder of its own gets one, NAME/NAME.yaml. Nothing is overwritten. What shows it in the
-    browser is said on standard error.
+    An example with a folder of its own gets one, NAME/NAME.yaml. Nothing is overwritten. On a terminal it
+    is said what shows it in the browser.
     """
     target = Path(name.removesuffix(".yaml") + ".yaml")
     if not _NAME.fullmatch(target.stem):
@@ -72,7 +73,7 @@ def command(context: click.Context, name: str, example: str | None, browse: bool
         from neurovis_spec.cli.live import command as live
 
         live.main([str(target), "--open"], prog_name="neurovis live", standalone_mode=False, parent=context.parent)
-    else:
+    elif on_terminal():
         click.echo(f"see it run: {shlex.join(['neurovis', 'live', str(target), '--open'])}", err=True)
 
 
