@@ -63,9 +63,11 @@ def test_pictures_of_another_title_are_the_same_in_each_appearance(tmp_path: Pat
     made, fresh = retitled(shown, file), nv.compile(file)
     assert made is not None
     assert made.placed() is layout
-    for appearance in (AS_IT_IS, Appearance(pathways=True), Appearance(theme="dark", activity=2.0)):
+    for appearance in (AS_IT_IS, Appearance(pathways=True), Appearance(activity=2.0)):
         view = Show().view(made, appearance, layout, Show().view(shown, appearance))
-        assert view.content == Show().view(fresh, appearance, layout).content
+        other = Show().view(fresh, appearance, layout)
+        assert view.content == other.content
+        assert view.dressed("dark").content == other.dressed("dark").content
 
 
 def test_an_edit_of_the_title_keeps_the_run_and_compiles_nothing(tmp_path: Path) -> None:

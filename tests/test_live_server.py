@@ -302,7 +302,8 @@ def test_a_client_sees_the_scene_the_status_and_frames() -> None:
             await eyes.ask("lesion", part="B")
             await eyes.until(lambda: bool(eyes.status["turned"]))
             await eyes.until(lambda: eyes.kinds[-1] == 2)
-            assert eyes.status["turned"] == [{"step": 3, "type": "lesion", "part": "B"}]
+            lesioned = {"step": 3, "type": "lesion", "part": "B", "number": 0, "back": {"type": "mend", "part": "B"}}
+            assert eyes.status["turned"] == [lesioned]
             await eyes.ask("set", values={"pull": 7.0})
             await eyes.until(lambda: eyes.told[-1]["type"] == "refused")
             assert "pull" in eyes.told[-1]["reason"]
