@@ -23,8 +23,7 @@ from neurovis_spec.live.source import Reach, SourceError
 from neurovis_spec.live.turns import Hold, Learn, Lesion, Mend, Set, Turn, Weigh
 from neurovis_spec.live.view import view_of
 
-COMPILED = nv.compile_text(
-    """neurovis: 1
+TEXT = """neurovis: 1
 name: x
 parameters: {pull: {value: 0.1, min: 0, max: 1}}
 neurons:
@@ -34,7 +33,7 @@ connections:
   A -> B: {weight: -0.5, plasticity: {hebbian: {rate: 0.05}}}
   B -> A: pull
 """
-)
+COMPILED = nv.compile_text(TEXT)
 
 
 def at(step: int) -> SimulatedSource:
@@ -236,7 +235,7 @@ def test_a_future_that_begins_later_than_the_run_stays_so(edited: bool) -> None:
     steps = (first, (first + end) // 2, end)
     was = [seen_at(source, step) for step in steps]
     source.restart()
-    source.switch(0)
+    source.switch(source.futures.all[-1].number)
     assert source.reach == Reach(first, end)
     assert [seen_at(source, step) for step in steps] == was
     with pytest.raises(SourceError, match="out of reach"):
@@ -252,8 +251,102 @@ def test_they_are_bounded_and_the_oldest_go_first(monkeypatch: pytest.MonkeyPatc
         while source.step < 20:
             source.advance()
     assert [one.number for one in source.futures.all] == [2, 3, 4]
+    assert source.futures.dropped == 2
     small = source.futures.bounded(source.futures.all[-1].size)
     assert [one.number for one in small.all] == [4]
+
+
+def test_futures_are_named_deleted_with_those_within_and_had_again() -> None:
+    source = at(30)
+    source.go(10)
+    source.turn(Lesion("A1"))
+    source.advance()
+    source.go(5)
+    source.turn(Set({"pull": 0.3}))
+    source.advance()
+    source.futures = source.futures.renamed(0, "first").renamed(1, "second")
+    before = shapes(source.futures.all)
+    less = source.futures.forgotten(0)
+    assert [(one.name, len(one.within)) for one in less.all] == [("second", 0)]
+    again = less.restored()
+    assert again is not None
+    assert (shapes(again.all), again.path(0)[-1].name) == (before, "first")
+    assert again.restored() is None
+    gone = source.futures.forgotten(1)
+    assert gone.all == ()
+    source.futures = gone
+    source.branch()
+    assert source.futures.restored() is not None, "as there is no other branch since"
+    source.go(3)
+    source.branch()
+    assert source.futures.restored() is None
+
+
+def test_a_name_goes_with_its_branch() -> None:
+    source = at(30)
+    source.go(10)
+    source.turn(Lesion("A1"))
+    source.advance()
+    source.futures = source.futures.renamed(0, "first")
+    source.switch(0)
+    assert (source.name, [one.name for one in source.futures.all]) == ("first", [""])
+    source.go(4)
+    source.turn(Lesion("A2"))
+    assert (source.name, [one.name for one in source.futures.all]) == ("", ["first"])
+    source.restart()
+    source.switch(source.futures.path(source.futures.all[-1].within[-1].number)[-1].number)
+    assert source.name == "first"
+
+
+def test_any_future_can_be_read_from_where_it_branched_off() -> None:
+    source = at(40)
+    whole = known(source, 41)
+    source.go(20)
+    source.turn(Lesion("A1"))
+    while source.step < 30:
+        source.advance()
+    second = known(source, 31)
+    source.go(10)
+    source.turn(Set({"pull": 0.5}))
+    inner = source.futures.history(0)
+    outer = source.futures.history(1)
+    assert inner is not None
+    assert outer is not None
+    one = Members("neurons", np.array([3]))
+    read = [history.read(one, Bins(0, 1, 41))[:, 0] for history in (inner, outer)]
+    assert np.array_equal(read[0][11:], whole[3, 11:])
+    assert np.isnan(read[0][:11]).all()
+    assert np.array_equal(read[1][11:31], second[3, 11:])
+    assert np.isnan(read[1][31:]).all()
+    assert source.futures.history(7) is None
+
+
+def test_what_was_before_an_edit_is_a_branch_that_goes_on_only_in_the_same_network() -> None:
+    source = at(70)
+    source.turn(Lesion("A1"))
+    source.advance()
+    before = everything(source)
+    same = carried(source, COMPILED.simulator())
+    (left,) = same.futures.all
+    assert (left.at, left.last, left.older) == (-1, 71, False)
+    same.advance()
+    same.switch(left.number)
+    assert everything(same) == before
+    edited = nv.compile_text(TEXT.replace("count: 3", "count: 2").replace("0.4}", "0.5}"))
+    other = carried(same, edited.simulator())
+    assert [(one.last, one.older) for one in other.futures.all] == [(72, True), (71, True)]
+    history = other.futures.history(other.futures.all[-1].number)
+    assert history is not None
+    index = edited.network.neurons.names.index("B")
+    read = history.read(Members("neurons", np.array([index])), Bins(0, 1, 72))[:, 0]
+    assert np.array_equal(read, known(same, 72)[3])
+    with pytest.raises(SourceError, match="of an older spec"):
+        other.switch(other.futures.all[0].number)
+    later = carried(other, COMPILED.simulator())
+    assert [(one.last, one.older) for one in later.futures.all] == [(72, True), (71, True), (71, True)]
+    missing = later.futures.history(later.futures.all[-1].number)
+    assert missing is not None
+    assert np.isnan(missing.read(Members("neurons", np.array([2])), Bins(0, 1, 9))).all(), "there was no A3"
 
 
 def test_a_ring_goes_on_with_steps_of_another() -> None:
@@ -283,7 +376,7 @@ def test_a_status_tells_them_and_a_message_goes_there() -> None:
         (1, 5, 11, [{"step": 10, "type": "lesion", "part": "A1"}])
     ]
     assert [(one["number"], one["turned"]) for one in told[0]["within"]] == [(0, [])]
-    left = run.shown().left
-    assert left is source.futures.all[0].history
+    left = run.shown().status.futures
+    assert left.history() is source.futures.all[0].history
     assert repr(command_of('{"type": "switch", "number": 1}')) == "Switch(number=1)"
     assert isinstance(source.futures.left, Future)

@@ -206,9 +206,34 @@ def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp
             words = f"from step 151 to {now}: step 151: lesion K3"
             await opened.until(f"document.querySelector('#others button').textContent == '{words}'")
             run = compiled.run(last + 1)
-            await opened.until(f"{STEP} == {now}")
+            here = min(now, last)
+            await opened.until(f"{STEP} == {here}")
             value = float(str(await opened.ask("document.querySelector('.now').textContent")).replace("−", "-"))
-            assert value == pytest.approx(run["O"][now], rel=1e-5)
+            assert value == pytest.approx(run["O"][here], rel=1e-5)
+            buttons = "[...document.querySelectorAll('#others button')]"
+            labels = f"{buttons}.map((one) => one.ariaLabel ?? '')"
+            await opened.ask(f"{buttons}[2].click()")
+            await opened.call("Input.insertText", text="without K3")
+            await opened.key("Enter")
+            await opened.until(f"{buttons}[0]?.textContent == 'without K3, {words}'")
+            assert await opened.ask(labels) == [
+                "",
+                *(f"{one} without K3" for one in ("compare with", "rename", "delete")),
+            ]
+            await opened.ask(f"{buttons}[1].click()")
+            await opened.until(f"{TRACE.format(0)}.includes(', behind it without K3')")
+            row = "document.querySelector('.trace').getBoundingClientRect()"
+            at = await opened.ask(f"[{row}.x + {row}.width * 0.6, {row}.y + 20]")
+            assert isinstance(at, list)
+            await opened.point(*at)
+            await opened.until("document.querySelector('#under').textContent.includes('  (without K3 ')")
+            (tmp_path / "branches.png").write_bytes(await opened.shot())
+            await opened.ask(f"{buttons}[3].click()")
+            await opened.until("document.querySelector('#futures').hidden")
+            assert await opened.ask("document.querySelector('#did').textContent") == "deleted without K3"
+            for kind in ("rawKeyDown", "keyUp"):
+                await opened.call("Input.dispatchKeyEvent", type=kind, key="z", modifiers=2)
+            await opened.until(f"{buttons}[0]?.textContent == 'without K3, {words}'")
 
     asyncio.run(main())
 

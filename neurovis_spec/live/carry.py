@@ -44,6 +44,14 @@ def carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
 
 def _carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
     was, network, turned = old.network, simulation.network, old.turned
+    past = old.past()
+    source = _going_on(old, simulation, turned)
+    source.futures = past if was.mark == network.mark else past.of_older_spec(was, network)
+    return source
+
+
+def _going_on(old: SimulatedSource, simulation: Simulation, turned: Sequence[Turned]) -> SimulatedSource:
+    was, network = old.network, simulation.network
     if not set(was.neurons.names) & set(network.neurons.names):
         return SimulatedSource(simulation)
     origin = simulation.state()

@@ -101,6 +101,26 @@ class Switch:
 
 
 @dataclass(frozen=True, slots=True)
+class Rename:
+    """Give another future a name, by its number."""
+
+    number: int
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Forget:
+    """Delete another future, by its number."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Restore:
+    """Have the future again that was deleted last."""
+
+
+@dataclass(frozen=True, slots=True)
 class Undo:
     """Take a turn back, by its number."""
 
@@ -153,8 +173,9 @@ class Draw:
     appearance: Appearance
 
 
-Showing: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Restart | Branch | Switch | Undo | Speed
-Command: TypeAlias = Showing | Loop | Unloop | Measure | Unmeasure | Turn
+Branching: TypeAlias = Branch | Switch | Rename | Forget | Restore | Undo
+Showing: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Restart | Speed
+Command: TypeAlias = Showing | Branching | Loop | Unloop | Measure | Unmeasure | Turn
 
 
 #: Where what was put by hand is written: into ``layout.positions`` of the spec, or into the layout file that the spec

@@ -1,29 +1,41 @@
 """Futures: what a run did behind a step at which somebody had it go on differently, kept so that it can be gone to.
 
 In: the states, the turns and the history of a run. Out: Futures, as a tree: within each those that branch off from it.
-They take bounded memory: of what is too much the oldest are forgotten.
+They take bounded memory: of what is too much the oldest are forgotten, and counted. Those of an older spec keep their
+histories alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, TypeAlias
 
-from neurovis_spec.live.history import Ring
+import numpy as np
+
+from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.beside import Beside
+from neurovis_spec.live.history import History, Of, Renamed, Ring, Spliced
 from neurovis_spec.live.past import Kept
 from neurovis_spec.live.turns import Turned
+from neurovis_spec.runtime.quantities import Quantities
 
 #: The most futures, and the most bytes that their states and histories take together.
 MOST: Final = 16
 ROOM: Final = 128 << 20
 
 
+#: The history of a run, or that of one of an older spec.
+Steps: TypeAlias = Ring | Renamed
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Future:
     """Behind step ``at`` it goes on to step ``last``, with all that was ``turned`` until then, by the states ``kept``;
     ``history`` is that of its steps alone. ``within`` are the futures that branch off from it. Its run ``started`` at a
-    step. It is asked for by its ``number``."""
+    step. It is asked for by its ``number``, and has a ``name`` where somebody gave it one. One of an ``older`` spec
+    cannot be gone to."""
 
     number: int
     at: int
@@ -31,8 +43,10 @@ class Future:
     started: int
     turned: tuple[Turned, ...]
     kept: tuple[Kept, ...]
-    history: Ring
+    history: Steps
     within: tuple[Future, ...] = ()
+    name: str = ""
+    older: bool = False
 
     @property
     def size(self) -> int:
@@ -47,6 +61,10 @@ class Futures:
     all: tuple[Future, ...] = ()
     #: how many there were
     made: int = 0
+    #: how many of these were forgotten as there was no room
+    dropped: int = 0
+    #: what was deleted last, with the number of what it was within (None: of nothing), until the tree is another
+    deleted: tuple[Future, int | None] | None = None
 
     @property
     def left(self) -> Future | None:
@@ -59,7 +77,7 @@ class Futures:
         within = tuple(one for one in self.all if one.at > left.at)
         made = replace(left, number=self.made, within=within)
         rest = (*(one for one in self.all if one.at <= left.at), made)
-        return Futures(rest, self.made + 1)
+        return replace(self, all=rest, made=self.made + 1, deleted=None)
 
     def left_at(self, at: int, turned: Sequence[Turned]) -> Future | None:
         """The one that was left last behind a step until which it was ``turned`` in this way."""
@@ -73,7 +91,11 @@ class Futures:
 
     def bounded(self, room: int = ROOM) -> Futures:
         """Without the oldest, where they are too many or take too much room."""
-        return replace(self, all=_bounded(self.all, room))
+        spare = 0 if self.deleted is None else self.deleted[0].size
+        kept = _bounded(self.all, room)
+        fewer = len(_every(self.all)) - len(_every(kept))
+        more = sum(one.size for one in _every(kept)) + spare > room
+        return replace(self, all=kept, dropped=self.dropped + fewer, deleted=None if fewer or more else self.deleted)
 
     def path(self, number: int) -> tuple[Future, ...]:
         """The futures that lead to one, from outside; none where there is none of this number."""
@@ -82,7 +104,47 @@ class Futures:
     def without(self, number: int) -> Futures:
         """Without one of these, and with what is within it."""
         (taken,) = [one for one in self.all if one.number == number]
-        return replace(self, all=tuple(one for one in (*self.all, *taken.within) if one is not taken))
+        rest = tuple(one for one in (*self.all, *taken.within) if one is not taken)
+        return replace(self, all=rest, deleted=None)
+
+    def renamed(self, number: int, name: str) -> Futures:
+        """With another name of one."""
+        return replace(self, all=_changed(self.all, number, lambda one: replace(one, name=name)))
+
+    def forgotten(self, number: int) -> Futures:
+        """Without one, and without what is within it; until the tree is another one it can be ``restored``."""
+        path = self.path(number)
+        within = path[-2].number if len(path) > 1 else None
+        return replace(self, all=_pruned(self.all, number), deleted=(path[-1], within))
+
+    def restored(self) -> Futures | None:
+        """With what was deleted last, where it was; None where that is no longer kept."""
+        if self.deleted is None:
+            return None
+        one, within = self.deleted
+        if within is None:
+            return replace(self, all=(*self.all, one), deleted=None)
+        put = _changed(self.all, within, lambda outer: replace(outer, within=(*outer.within, one)))
+        return replace(self, all=put, deleted=None)
+
+    @property
+    def histories(self) -> Iterator[History]:
+        """Those of all, also within each other."""
+        return (one.history for one in _every(self.all))
+
+    def history(self, number: int | None = None) -> History | None:
+        """How the run went in one, from where it branched off from the run as it goes; by default in the one that was
+        left last. None where there is none."""
+        if number is None:
+            left = self.left
+            return None if left is None else left.history
+        path = self.path(number)
+        ends = [*(one.at for one in path[1:]), path[-1].last] if path else []
+        return Spliced(tuple((one.history, end) for one, end in zip(path, ends, strict=True))) if path else None
+
+    def of_older_spec(self, network: Network, now: Network) -> Futures:
+        """All of them, of one network, as those of an older spec of another."""
+        return replace(self, all=_older(self.all, _places(network, now)), deleted=None)
 
 
 def _path(futures: Sequence[Future], number: int) -> tuple[Future, ...]:
@@ -106,6 +168,53 @@ def _bounded(futures: tuple[Future, ...], room: int) -> tuple[Future, ...]:
         futures = _pruned(futures, oldest.number)
         found = _every(futures)
     return futures
+
+
+def _changed(futures: tuple[Future, ...], number: int, change: Callable[[Future], Future]) -> tuple[Future, ...]:
+    """With a change of one of them, wherever it is."""
+    return tuple(
+        change(one) if one.number == number else replace(one, within=_changed(one.within, number, change))
+        for one in futures
+    )
+
+
+def _older(futures: tuple[Future, ...], places: Mapping[Of, IntArray]) -> tuple[Future, ...]:
+    """With no states, and by the places that things have by now."""
+    return tuple(
+        replace(
+            one,
+            kept=(),
+            history=Renamed(one.history, places),
+            within=_older(one.within, places),
+            older=True,
+        )
+        for one in futures
+    )
+
+
+def _places(network: Network, now: Network) -> dict[Of, IntArray]:
+    """Where in a network stands what there is by now, by its name; −1 for nothing."""
+
+    def of(names: Sequence[str], others: Sequence[str]) -> IntArray:
+        known = {name: place for place, name in enumerate(names)}
+        return np.array([known.get(name, -1) for name in others], np.int64)
+
+    return {
+        "neurons": of(network.neurons.names, now.neurons.names),
+        "connections": of(network.connection_names, now.connection_names),
+        "quantities": of(_called(network), _called(now)),
+    }
+
+
+def _called(network: Network) -> tuple[str, ...]:
+    """How quantities are called, and behind them inputs and sensors, as no quantity is."""
+    quantities = Quantities(network).names
+    beside = Beside(network, len(quantities))
+    inputs, sensors = (
+        (f"input {name}" for name in beside.input_names),
+        (f"sensor {name}" for name in beside.sensor_names),
+    )
+    return (*quantities, *inputs, *sensors)
 
 
 def _pruned(futures: tuple[Future, ...], number: int) -> tuple[Future, ...]:

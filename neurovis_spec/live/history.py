@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from threading import Lock
 from typing import Final, Literal, Protocol, TypeAlias
@@ -248,6 +248,56 @@ class Ring:
             parts = [(begin, end)] if begin < end else [(begin, self._size), (0, end)]
             values = np.concatenate([self._values[one:other, column] for one, other in parts])[:, None]
         return _ranges(steps, members.join(values), bins)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Renamed:
+    """What is known of a run of another network, by the ``places`` that things had there (−1: there were none)."""
+
+    history: Ring | Renamed
+    places: Mapping[Of, IntArray]
+
+    @property
+    def size(self) -> int:
+        """The bytes that it takes."""
+        return self.history.size
+
+    def follow(self, series: Mapping[str, Series]) -> None:
+        """Nothing is known of the series of another network."""
+
+    def read(self, members: Members, bins: Bins) -> Range:
+        """The least and the largest value in each bin."""
+        if members.series:
+            return _unknown(bins)
+        places = self.places[members.of]
+        indices, less = places[members.indices], None if members.less is None else places[members.less]
+        if (indices < 0).any() or (less is not None and (less < 0).any()):
+            return _unknown(bins)
+        return self.history.read(replace(members, indices=indices, less=less), bins)
+
+
+@dataclass(frozen=True, slots=True)
+class Spliced:
+    """Histories that follow each other, each with the step at which the next one takes over."""
+
+    parts: tuple[tuple[History, int], ...]
+
+    def follow(self, series: Mapping[str, Series]) -> None:
+        """Work out these series, and no others."""
+        for history, _ in self.parts:
+            history.follow(series)
+
+    def read(self, members: Members, bins: Bins) -> Range:
+        """The least and the largest value in each bin; one in which a part takes over has what is known of the later
+        one."""
+        result = _unknown(bins)
+        for history, end in self.parts:
+            count = min(bins.count, (end - bins.first) // bins.every + 1)
+            if count > 0:
+                found = history.read(members, replace(bins, count=count))
+                known = ~np.isnan(found[:, 0])
+                result[:count][known] = found[known]
+        return result
 
 
 class Recorded:

@@ -221,8 +221,9 @@ class Hub:
         wanted, client.wanted = client.wanted, None
         if client in self._clients and shown is not None and wanted is not None:
             read = partial(self._traces, shown.view)
+            left = shown.status.futures.history(wanted.branch)
             client.traces = (
-                *(() if shown.left is None else (read(shown.left, wanted.items, wanted.bins, LEFT),)),
+                *(() if left is None else (read(left, wanted.items, wanted.bins, LEFT),)),
                 read(shown.history, wanted.items, wanted.bins, TRACE),
                 *((read(shown.history, wanted.pairs, wanted.steps, PAIRS),) if wanted.pairs else ()),
                 *(self._raster(shown, item, wanted.bins) for item in wanted.rasters),

@@ -32,13 +32,16 @@ from neurovis_spec.live.commands import (
     Draw,
     Event,
     Fetch,
+    Forget,
     Loop,
     Measure,
     Pause,
     PlaceNeuron,
     Play,
+    Rename,
     Request,
     Restart,
+    Restore,
     Save,
     Seek,
     Speed,
@@ -97,6 +100,8 @@ _TRACED, _RASTERS, _BINS, _EVERY = 24, 8, 2048, 1 << 32
 _LISTED = 1000
 #: The most turns by which a future is called.
 _SAID = 4
+#: The most characters of the name of a future.
+_CALLED = 80
 #: The most steps that are made at once.
 _NEAR = 64
 
@@ -165,9 +170,11 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         events=list(status.events[:_LISTED]),
         appearance=asdict(status.appearance),
         backend=status.backend,
-        futures=[_future(one) for one in status.futures],
         loop=None if status.loop is None else list(status.loop),
         measures=[{"number": number, "text": text} for number, text in status.measures],
+        futures=[_future(one) for one in status.futures.all],
+        dropped=status.futures.dropped,
+        branch=status.branch,
     )
 
 
@@ -192,7 +199,8 @@ def _future(future: Future) -> dict[str, object]:
     begin = bisect_left(future.turned, future.at, key=attrgetter("step"))  # with each frame, of thousands in a drag
     own = [_turned(entry) for entry in future.turned[begin : begin + _SAID]]
     within = [_future(one) for one in future.within]
-    return {"number": future.number, "at": future.at, "last": future.last, "turned": own, "within": within}
+    named = {"number": future.number, "name": future.name, "older": future.older}
+    return {**named, "at": future.at, "last": future.last, "turned": own, "within": within}
 
 
 def _listed(entry: Turned) -> dict[str, object]:
@@ -220,7 +228,7 @@ def values_message(step: int, values: Mapping[str, float]) -> str:
 def trace_message(version: int, traces: Mapping[tuple[int, int], Range], bins: Bins, kind: int = TRACE) -> bytes:
     """Traces of items (``View.place``), each with what of it that is: 0 its activity or weight, else the
     number of a name in the list that the scene has for it, from 1 on. The least and the largest value of each bin. Of
-    the ``kind`` LEFT they are those of the future that was left last; of PAIRS a bin is a step."""
+    the ``kind`` LEFT they are those of another future; of PAIRS a bin is a step."""
     head = _TRACE_HEAD.pack(kind, version, len(traces), bins.first, bins.every, bins.count)
     items = np.array(list(traces), "<u4").reshape(-1, 2).T
     return b"".join([head, items.tobytes(), *(trace.astype("<f4").tobytes() for trace in traces.values())])
@@ -321,6 +329,8 @@ class Trace:
     bins: Bins
     rasters: tuple[str, ...] = ()
     pairs: tuple[str, ...] = ()
+    #: the number of the future that it wants beside; by default that of the one that was left last
+    branch: int | None = None
 
     @property
     def steps(self) -> Bins:
@@ -406,6 +416,12 @@ def _measure_text(value: object) -> str:
     return value.strip()
 
 
+def _called(value: object) -> str:
+    if not isinstance(value, str) or len(value) > _CALLED:
+        raise ProtocolError(f"a name of at most {_CALLED} characters is wanted")
+    return " ".join(value.split())
+
+
 def _truth(value: object) -> bool:
     if not isinstance(value, bool):
         raise ProtocolError("true or false is wanted")
@@ -487,12 +503,13 @@ def _trace(
     bins: int,
     rasters: tuple[str, ...] = (),
     pairs: tuple[str, ...] = (),
+    branch: int | None = None,
 ) -> Trace:
     if max(len(items), len(pairs)) > _TRACED or len(rasters) > _RASTERS:
         raise ProtocolError(f"at most {_TRACED} traces and {_RASTERS} rasters are wanted")
     if any(item[0] != "n" or "." in item for item in rasters):
         raise ProtocolError("rasters are of neurons")
-    return Trace(items, Bins(first, every, bins), rasters, pairs)
+    return Trace(items, Bins(first, every, bins), rasters, pairs, branch)
 
 
 def _held(value: object) -> str:
@@ -531,6 +548,9 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "branch": ({}, Branch),
     "switch": ({"number": _whole(0, _MOST)}, Switch),
     "theme": ({"name": _theme, "dark": _truth}, Themed),
+    "rename": ({"number": _whole(0, _MOST), "name": _called}, Rename),
+    "forget": ({"number": _whole(0, _MOST)}, Forget),
+    "restore": ({}, Restore),
     "undo": ({"number": _whole(0, _MOST)}, Undo),
     "draw": ({**dict.fromkeys(_GAINS, _factor), "pathways": _truth}, _draw),
     "speed": ({"value": _speed}, Speed),
@@ -553,6 +573,6 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "fetch": ({"what": _one_of("svg", "film", "npz"), "seconds": _seconds}, Fetch),
 }
 #: Members that a message need not have.
-_OPTIONAL: Final = {"moving", "pathways", "rasters", "pairs"}
+_OPTIONAL: Final = {"moving", "pathways", "rasters", "pairs", "branch"}
 #: The types of the messages that a client may send, for the tests of the documentation.
 MESSAGES: Final = tuple(_MESSAGES)

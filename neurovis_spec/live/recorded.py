@@ -38,6 +38,7 @@ class RecordedSource:
 
     capabilities = Capabilities(ends=True)
     futures = Futures()
+    name = ""
 
     def __init__(self, network: Network, recording: Recording) -> None:
         self.network, self._recording = network, fitted(recording, network)

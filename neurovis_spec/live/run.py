@@ -27,12 +27,15 @@ from neurovis_spec.live.commands import (
     Command,
     Draw,
     Event,
+    Forget,
     Loop,
     Measure,
     Pause,
     Play,
     Present,
+    Rename,
     Restart,
+    Restore,
     Seek,
     Speed,
     Step,
@@ -42,7 +45,7 @@ from neurovis_spec.live.commands import (
     Unmeasure,
 )
 from neurovis_spec.live.curves import series_of
-from neurovis_spec.live.futures import Future
+from neurovis_spec.live.futures import Futures
 from neurovis_spec.live.history import History
 from neurovis_spec.live.series import Series
 from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, Source, SourceError
@@ -60,7 +63,8 @@ P = ParamSpec("P")
 class Status:
     """What a client is told of a run when it changes: ``ended`` where there is no further step; ``events``, the steps
     at which the spec has some; ``backend``, what makes the steps, "" where that is not known;
-    ``futures``, what else the run has done behind steps of its past; ``measures``, the number and the text of each that
+    ``futures``, what else the run has done behind steps of its past; ``branch``, the name of what it does, "" without
+    one; ``measures``, the number and the text of each that
     somebody has typed; ``loop``, the first and the last step of what is played over and over."""
 
     playing: bool
@@ -74,7 +78,8 @@ class Status:
     events: tuple[int, ...]
     appearance: Appearance
     backend: str
-    futures: tuple[Future, ...]
+    futures: Futures
+    branch: str
     measures: tuple[tuple[int, str], ...] = ()
     loop: tuple[int, int] | None = None
 
@@ -89,8 +94,6 @@ class Shown:
     reach: Reach
     status: Status
     history: History
-    #: that of the future that was left last, and what it has since the run goes on differently
-    left: History | None
     body: Drawn
     quantities: FloatArray | None
     undefined: Undefined | None
@@ -122,6 +125,13 @@ class _Inquiry:
     """A function to be called with the source, in the thread of the run."""
 
     what: Callable[[Source], object]
+
+
+def _known(source: Source, number: int) -> Futures:
+    """The futures, one of which has this number. Raises SourceError."""
+    if not source.futures.path(number):
+        raise SourceError("this branch is no longer kept")
+    return source.futures
 
 
 def _ignore(message: str) -> None:
@@ -286,6 +296,15 @@ class Run:
                 source.switch(asked.number)
                 self._target, self._ended, self._loop = None, False, None
                 self._clock.start(now)
+            case Rename():
+                source.futures = _known(source, asked.number).renamed(asked.number, asked.name)
+            case Forget():
+                source.futures = _known(source, asked.number).forgotten(asked.number)
+            case Restore():
+                restored = source.futures.restored()
+                if restored is None:
+                    raise SourceError("what was deleted is no longer kept")
+                source.futures = restored
             case Undo():
                 source.take_back(asked.number)
                 self._ended = False
@@ -469,19 +488,18 @@ class Run:
             events=self._events(),
             appearance=self.appearance,
             backend=source.backend,
-            futures=source.futures.all,
+            futures=source.futures,
+            branch=source.name,
             measures=self._typed.told,
             loop=self._loop,
         )
         seen = source.seen()
         glance, reach = self._view.glance(seen), source.reach
-        left = source.futures.left
-        before = None if left is None else left.history
-        for history in (source.history, *(() if before is None else (before,))):
+        for history in (source.history, *source.futures.histories):
             history.follow(self._followed())
         lost = self._not_finite(glance, status.turned)
-        past = source.history, before
-        return Shown(self._view, seen, glance, reach, status, *past, source.body, source.quantities, lost)
+        beside = source.body, source.quantities, lost
+        return Shown(self._view, seen, glance, reach, status, source.history, *beside)
 
     def _not_finite(self, glance: Glance, turned: tuple[Turned, ...]) -> Undefined | None:
         """What is not finite at the step that is shown."""

@@ -59,7 +59,7 @@ class SimulatedSource:
     """A network that runs; it stands at the first step to be computed: step 0, or that of ``begin``, a state in which
     ``turned`` has had its effect and inputs are ``fed``. ``origin`` is where it begins anew."""
 
-    capabilities = Capabilities(TURNS | {"branch", "switch", "undo"})
+    capabilities = Capabilities(TURNS | {"branch", "switch", "rename", "forget", "restore", "undo"})
 
     def __init__(
         self,
@@ -83,7 +83,7 @@ class SimulatedSource:
         self._signals.follow(simulation)
         self._origin = simulation.state() if origin is None else origin
         #: the other futures of this run
-        self.futures = Futures()
+        self.futures, self.name = Futures(), ""
         #: how many turns were taken
         self._taken = 1 + max((entry.number for entry in turned), default=-1)
         self._begin(self._origin if begin is None else begin, turned, fed or {})
@@ -263,19 +263,24 @@ class SimulatedSource:
         with self._whole():
             before = self._left(-1).bounded()
             self._begin(self._origin, (), {})
-            self.futures = before
+            self.futures, self.name = before, ""
 
     def recall(self, steps: int) -> list[Seen]:
         """What was seen of the last steps."""
         with self._whole():
             return recalled(self, steps)
 
+    def past(self) -> Futures:
+        """All that it has done, as another future of a run that begins anew."""
+        return self._left(-1).bounded() if self._last > 0 else self.futures
+
     def _left(self, at: int) -> Futures:
         """The futures with what came after this step among them, if anything did that can be gone to."""
         if self._last <= at or not len(self._past):
             return self.futures
         kept, history = self._past.after(at), self.history.after(at)
-        return self.futures.leave(Future(0, at, self._last, self._started, tuple(self._turned), kept, history))
+        turned = tuple(self._turned)
+        return self.futures.leave(Future(0, at, self._last, self._started, turned, kept, history, name=self.name))
 
     def switch(self, number: int) -> None:
         """Go to another future, to the step that is shown, or to its last. Raises SourceError, also where the body
@@ -283,6 +288,8 @@ class SimulatedSource:
         path, step = self.futures.path(number), self.step
         if not path:
             raise SourceError("this future is no longer kept")
+        if path[-1].older:
+            raise SourceError("this branch is of an older spec: its curves can be shown, but it cannot go on")
         self._check_going()
         with self._whole():
             self._past, self.history = self._past.copy(), self.history.copy()
@@ -306,7 +313,10 @@ class SimulatedSource:
 
     def branch(self) -> None:
         """Have the run go on differently from here; what came after is another future."""
+        before = self.futures.made
         self.futures = self._left(self.step).bounded()
+        if self.futures.made > before:
+            self.name = ""
         self._past.cut(self._simulation.k)
         self.history.cut(self.step)
         self._last = self.step
@@ -371,7 +381,9 @@ class SimulatedSource:
         self.futures = self.futures.without(future.number)
         for kept in future.kept:
             self._past.keep(kept)
+        assert isinstance(future.history, Ring)
         self.history.go_on(future.history)
+        self.name = future.name
         self._turned, self._last, self._listed = list(future.turned), future.last, ([], ())
 
     def _opposite(self, what: Turn) -> Turn:

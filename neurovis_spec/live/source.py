@@ -41,9 +41,10 @@ class Reach:
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What kind of source it is. ``takes``: the names of the turns that it accepts, ``branch``, ``switch`` and
-    ``undo`` if it accepts these; ``ends``: there is a last step; ``arrives``: its steps are received from elsewhere, so
-    it is advanced once a frame, not by dt, and waits at the newest."""
+    """What kind of source it is. ``takes``: the names of the turns that it accepts, and of what is done with futures
+    (``branch``, ``switch``, ``rename``, ``forget``, ``restore``, ``undo``) if it accepts that; ``ends``: there is a
+    last step; ``arrives``: its steps are received from elsewhere, so it is advanced once a frame, not by dt, and waits
+    at the newest."""
 
     takes: frozenset[str] = frozenset()
     ends: bool = False
@@ -94,6 +95,8 @@ class Source(Protocol):
     body: Drawn
     #: what else the run has done behind steps of its past
     futures: Futures
+    #: the name of what it does, where it is a future that was given one and gone to
+    name: str
 
     @property
     def step(self) -> int:

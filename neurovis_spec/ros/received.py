@@ -91,7 +91,7 @@ class ReceivedSource:
     def __init__(self, network: Network, room: int = ROOM) -> None:
         self.network, self._room = network, room
         self.capabilities = Capabilities(arrives=True)
-        self.body, self.futures = NOTHING, Futures()
+        self.body, self.futures, self.name = NOTHING, Futures(), ""
         self._steering: Steering | None = None
         self._turned: tuple[Turned, ...] = ()
         self._changing = network.changing

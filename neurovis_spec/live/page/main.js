@@ -6,6 +6,7 @@ import { Attention } from './attention.js';
 import { Axis } from './axis.js';
 import { Beside, isBeside } from './beside.js';
 import { Body } from './body.js';
+import { Branches } from './branches.js';
 import { Camera } from './camera.js';
 import { channels, luminance } from './colours.js';
 import { Controls, part } from './controls.js';
@@ -29,7 +30,8 @@ import { say } from './say.js';
 import { Scrubber } from './scrubber.js';
 import { withNumber } from './sliders.js';
 import { Strips } from './strips.js';
-import { Turning, told } from './turning.js';
+import { told } from './told.js';
+import { Turning } from './turning.js';
 import { Undo } from './undo.js';
 import { Zoom } from './zoom.js';
 
@@ -184,6 +186,7 @@ const link = new Link({
       scrubber.status(message);
       turning.status(message);
       undo.status(message);
+      branches.status(message);
       placing.status(message);
       range.status(message);
       strips.owner = message.owner;
@@ -229,6 +232,7 @@ const scrubber = new Scrubber(link, part, redraw);
 const range = new Range(link, scrubber, part, redraw);
 const axis = new Axis(scrubber, part);
 const strips = new Strips(link, attention, beside, scrubber, axis, part('strips'), part('under'));
+const branches = new Branches(link, part, undo, (number, name) => strips.compare(number, name));
 const measuring = new Measuring(link, strips, part);
 const body = new Body(part('embodied'), part('posed'), part('bodily'), redraw);
 

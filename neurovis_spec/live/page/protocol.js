@@ -46,10 +46,11 @@ import { isStill } from './camera.js';
  * @typedef {{points: string[], links: number[][], feet: number[], middle: number,
  *   solids: [number[], number[]][]}} Skeleton */
 /** What else the run has done behind a step: until which step, with what was turned, and what branches off from that.
- * @typedef {{number: number, at: number, last: number, turned: Turned[], within: Future[]}} Future */
+ * A name where it was given one; one of an older spec cannot be gone to.
+ * @typedef {{number: number, at: number, last: number, turned: Turned[], within: Future[], name: string, older: boolean}} Future */
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
  *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
- *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[], measures: {number: number, text: string}[], loop: number[] | null}} Status */
+ *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[], dropped: number, branch: string, measures: {number: number, text: string}[], loop: number[] | null}} Status */
 /** What is not finite: the first, since which step, or an earlier one that is not known, and how many are; '' where nothing is.
  * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}

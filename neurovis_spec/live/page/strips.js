@@ -21,7 +21,7 @@ import { THUMB } from './scrubber.js';
 /** What it shows of a neuron or a connection: its activity or weight where `what` is empty; `key` is what that is asked by,
  * `told` what it is called; behind it, in the same axis, `behind`; `names` and `seen` are the names
  * of all of these, and their ranges. Signals that are `joined` have the same axis; `against` another it is drawn in a plane.
- * @typedef {{id: string, what: string, key: string, told: string, behind: string[], names: string[], seen: Seen[], joined: Joined[], against: Joined | null, join: HTMLSelectElement, data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
+ * @typedef {{id: string, what: string, key: string, told: string, behind: string[], names: string[], seen: Seen[], left: Seen | null, joined: Joined[], against: Joined | null, join: HTMLSelectElement, data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
  *   canvas: HTMLCanvasElement, ends: HTMLElement[], pin: HTMLButtonElement, parts: HTMLElement[]}} Strip */
 
 /** What a model with a spike block has, 1 in the steps in which it fires. */
@@ -79,6 +79,9 @@ export class Strips {
     /** the values of what is drawn in planes, and those of now that are drawn in them @type {Traces | null} */
     this.paired = null;
     this.pointed = attention.values;
+    /** the branch that all is compared with, null for the one that was left last, and what it is called @type {number | null} */
+    this.branch = null;
+    this.called = '';
     this.timer = 0;
     this.of(this.held, undefined);
     this.list();
@@ -108,6 +111,7 @@ export class Strips {
       joined: [],
       against: null,
       join,
+      left: null,
       data: '',
       name,
       choice,
@@ -212,13 +216,16 @@ export class Strips {
     if (x === null) return;
     const { clientWidth: width, offsetLeft } = this.held.canvas,
       step = this.scrubber.under(x, width);
-    const lines = [...this.pinned, this.held].flatMap(({ names, seen }) =>
-      seen.map(({ trace, first, every }, at) => {
-        const bin = Math.floor((step - first) / every),
-          [least, most] = [trace[2 * bin], trace[2 * bin + 1]];
-        return least <= most
-          ? `${names[at]}  ${signed(rounded(least))}${most > least ? ` … ${signed(rounded(most))}` : ''}`
-          : '';
+    const told = (/** @type {Seen} */ { trace, first, every }) => {
+      const bin = Math.floor((step - first) / every),
+        [least, most] = [trace[2 * bin], trace[2 * bin + 1]];
+      return least <= most ? `${signed(rounded(least))}${most > least ? ` … ${signed(rounded(most))}` : ''}` : '';
+    };
+    const lines = [...this.pinned, this.held].flatMap(({ names, seen, left }) =>
+      seen.map((one, at) => {
+        const [now, other] = [told(one), left && at === 0 ? told(left) : ''];
+        const beside = other && `  (${this.called || 'before'} ${other})`;
+        return now || other ? `${names[at]}  ${now}${beside}` : '';
       }),
     );
     const box = this.under.firstChild ?? this.under.appendChild(document.createElement('div'));
@@ -284,8 +291,15 @@ export class Strips {
   clear(strip) {
     for (const part of [strip.value, ...strip.ends]) part.textContent = '';
     strip.canvas.width = 0;
-    strip.seen = [];
+    [strip.seen, strip.left] = [[], null];
     this.asked = '';
+  }
+
+  /** Compare with a branch, or, where that is null, with the one that was left last. @param {number | null} branch @param {string} called */
+  compare(branch, called) {
+    [this.branch, this.called] = [branch, called];
+    this.asked = '';
+    this.show();
   }
 
   /** Another network; what has the same name in it stays pinned. */
@@ -418,7 +432,11 @@ export class Strips {
       return;
     }
     [this.asked, this.when, this.waiting] = [wanted, now, true];
-    const more = { ...(rasters.length ? { rasters } : {}), ...(pairs.length ? { pairs } : {}) };
+    const more = {
+      ...(rasters.length ? { rasters } : {}),
+      ...(pairs.length ? { pairs } : {}),
+      ...(this.branch === null ? {} : { branch: this.branch }),
+    };
     this.link.ask('trace', { items, first, every, bins: Math.floor((high - first) / every) + 1, ...more });
   }
 
@@ -488,6 +506,7 @@ export class Strips {
    * @param {Traces} traces @param {{behind: Float32Array[], joined: Float32Array[], left: Float32Array | undefined}} others @param {Float32Array} [spikes] */
   paint(strip, trace, { first, every }, { behind, joined, left }, spikes) {
     strip.seen = [trace, ...behind, ...joined].map((one) => ({ trace: one, first, every }));
+    strip.left = left ? { trace: left, first, every } : null;
     const { canvas } = strip,
       [context, x] = this.blank(canvas);
     const { clientWidth: width, clientHeight: height } = canvas,
@@ -555,7 +574,7 @@ export class Strips {
     }
     context.strokeStyle = style.color;
     follow(context, trace, middle, y);
-    const went = left?.some(Number.isFinite) ? ', behind it how it went before' : '';
+    const went = left?.some(Number.isFinite) ? `, behind it ${this.called || 'how it went before'}` : '';
     canvas.setAttribute(
       'aria-label',
       known

@@ -7,38 +7,15 @@ import { eventsOf } from './events.js';
 import { Feeds } from './feeds.js';
 import { Rules } from './rules.js';
 import { Sliders, withNumber } from './sliders.js';
+import { told } from './told.js';
 import { Weight } from './weight.js';
 
-/** @typedef {import('./protocol.js').Future} Future */
 /** @typedef {import('./protocol.js').Gains} Gains */
 /** @typedef {import('./protocol.js').Status} Status */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./protocol.js').Turned} Turned */
-
-/** A turn in words. @param {Turned} turn @returns {string} */
-export function told(turn) {
-  const pairs = (/** @type {object} */ values) =>
-    Object.entries(values)
-      .map(([name, value]) => `${name} = ${value}`)
-      .join(', ');
-  const fed = Object.values(turn.values ?? {});
-  switch (turn.type) {
-    case 'set':
-      return pairs(turn.values);
-    case 'hold':
-      return `clamp ${turn.neurons} = ${turn.value}`;
-    case 'feed':
-      return fed.length ? `feed ${turn.name} = ${fed.join(', ')}` : `feed ${turn.name} no more`;
-    case 'weigh':
-      return `weight of ${turn.connections} = ${turn.value}`;
-    case 'learn':
-      return `learning of ${turn.connections} ${turn.on ? 'on' : 'off'}`;
-    default:
-      return `${turn.type} ${turn.neurons || turn.part}`;
-  }
-}
 
 /** The panel in which a run is turned. */
 export class Turning {
@@ -58,7 +35,6 @@ export class Turning {
       /** @type {HTMLButtonElement} */ (find('pathways')),
     );
     this.shown = '';
-    this.others = '';
     this.ref = '';
     const clampTo = /** @type {HTMLInputElement} */ (find('clampto'));
     find('clamp').onclick = () => withNumber(clampTo, (value) => link.ask('hold', { neurons: this.ref, value }));
@@ -114,33 +90,7 @@ export class Turning {
     this.feeds.show(status.fed);
     this.rules.show(status.learning);
     this.list(status.turned, status.appearance);
-    this.branches(status.futures);
     /** @type {HTMLTextAreaElement} */ (this.find('events')).value = eventsOf(status.turned);
-  }
-
-  /** List what else the run has done, with what was turned in it; one click goes there. @param {Future[]} futures */
-  branches(futures) {
-    const list = this.find('others'),
-      key = JSON.stringify(futures);
-    this.find('futures').hidden = !futures.length;
-    if (key === this.others) return;
-    this.others = key;
-    const rows = (/** @type {Future[]} */ some) =>
-      [...some].reverse().map(({ number, at, last, turned, within }) => {
-        const one = document.createElement('li'),
-          go = document.createElement('button');
-        const words = turned.map((entry) => `step ${entry.step + 1}: ${told(entry)}`).join('; ') || 'as it went';
-        go.textContent = `from step ${at + 1} to ${last}: ${words}`;
-        go.onclick = () => this.link.ask('switch', { number });
-        one.append(go);
-        if (within.length) {
-          const inner = document.createElement('ul');
-          inner.append(...rows(within));
-          one.append(inner);
-        }
-        return one;
-      });
-    list.replaceChildren(...rows(futures));
   }
 
   /** List what was turned, the latest first, and after that what is drawn otherwise.

@@ -1,0 +1,159 @@
+/**
+ * Branches: what else the run has done, as a tree; gone to, compared, named and deleted.
+ */
+
+import { told } from './told.js';
+
+/** @typedef {import('./protocol.js').Future} Future */
+/** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Status} Status */
+/** @typedef {import('./undo.js').Undo} Undo */
+
+/** The list of branches. */
+export class Branches {
+  /** @param {Link} link @param {(id: string) => HTMLElement} find @param {Undo} undo
+   * @param {(number: number | null, name: string) => void} compare called with the branch that curves are compared with, null for none */
+  constructor(link, find, undo, compare) {
+    this.link = link;
+    this.find = find;
+    this.undo = undo;
+    this.compare = compare;
+    /** the branch that is compared @type {number | null} */
+    this.chosen = null;
+    this.shown = '';
+    this.owner = false;
+    /** how many were forgotten, −1 where that is not known yet */
+    this.dropped = -1;
+    /** the one that is being named */
+    this.naming = -1;
+  }
+
+  /** @param {Status} status */
+  status({ futures, dropped, branch, owner }) {
+    if (this.dropped >= 0 && dropped > this.dropped)
+      this.undo.tell('the oldest branch was forgotten: there is room for 16, in 128 MiB');
+    this.dropped = dropped;
+    this.owner = owner;
+    this.find('futures').hidden = !futures.length;
+    this.find('current').hidden = !branch;
+    this.find('current').textContent = branch ? `this one: ${branch}` : '';
+    const key = JSON.stringify([futures, owner]);
+    if (key === this.shown || (this.naming >= 0 && this.all(futures).some(({ number }) => number === this.naming)))
+      return;
+    this.shown = key;
+    if (this.chosen !== null && !this.all(futures).some(({ number }) => number === this.chosen)) this.choose(null, '');
+    this.list(futures);
+  }
+
+  /** All of a tree. @param {Future[]} futures @returns {Future[]} */
+  all(futures) {
+    return futures.flatMap((one) => [one, ...this.all(one.within)]);
+  }
+
+  /** @param {Future[]} futures */
+  list(futures) {
+    const list = this.find('others'),
+      focused = list.contains(document.activeElement);
+    list.replaceChildren(...this.rows(futures));
+    if (focused) (list.querySelector('button') || this.find('copy')).focus();
+  }
+
+  /** The rows of a tree, the latest first. @param {Future[]} futures @returns {HTMLElement[]} */
+  rows(futures) {
+    return [...futures].reverse().map((one) => {
+      const row = document.createElement('li'),
+        inner = document.createElement('ul');
+      row.className = 'branch';
+      inner.className = 'tree';
+      row.append(this.branch(one));
+      inner.append(...this.rows(one.within));
+      if (one.within.length) row.append(inner);
+      return row;
+    });
+  }
+
+  /** What can be done with a branch. @param {Future} future @returns {HTMLElement} */
+  branch(future) {
+    const { number, name, at, last, turned, within, older } = future;
+    const words = turned.map((entry) => `step ${entry.step + 1}: ${told(entry)}`).join('; ') || 'as it went',
+      span = `from step ${at + 1} to ${last}`,
+      called = name || `the branch ${span}`;
+    const go = this.button(
+      `${name ? `${name}, ` : ''}${span}: ${words}${older ? ' (of an older spec)' : ''}`,
+      '',
+      () => (older ? this.choose(number, called) : this.link.ask('switch', { number })),
+    );
+    go.className = 'go';
+    go.title = older
+      ? 'its curves can be shown beside; it cannot go on, as the spec is another one'
+      : 'go there, to the same step';
+    go.disabled = !this.owner && !older;
+    const compare = this.button('compare', `compare with ${called}`, () =>
+      this.choose(this.chosen === number ? null : number, called),
+    );
+    compare.setAttribute('aria-pressed', String(this.chosen === number));
+    compare.dataset.branch = String(number);
+    const place = document.createElement('span');
+    compare.className = 'small';
+    place.append(compare);
+    if (this.owner) {
+      const forget = this.button('delete', `delete ${called}`, () => {
+        this.link.ask('forget', { number });
+        const more = within.length ? `, and ${this.all(within).length} within it` : '';
+        const again = { undo: () => this.link.ask('restore'), redo: () => this.link.ask('forget', { number }) };
+        this.undo.act({ words: `deleted ${called}${more}`, ...again });
+        this.undo.tell(`deleted ${called}${more}`);
+      });
+      const rename = this.button('rename', `rename ${called}`, () => this.rename(future, go));
+      forget.className = rename.className = 'small';
+      place.append(rename, forget);
+    }
+    const whole = document.createElement('div');
+    whole.append(go, place);
+    return whole;
+  }
+
+  /** @param {string} words @param {string} label @param {() => void} does @returns {HTMLButtonElement} */
+  button(words, label, does) {
+    const made = document.createElement('button');
+    made.textContent = words;
+    if (label) made.setAttribute('aria-label', label);
+    made.onclick = does;
+    return made;
+  }
+
+  /** Give a branch another name, in its place. @param {Future} future @param {HTMLElement} place */
+  rename({ number, name }, place) {
+    const field = Object.assign(document.createElement('input'), { value: name, maxLength: 80, className: 'naming' });
+    field.setAttribute('aria-label', 'name of the branch');
+    this.naming = number;
+    let open = true;
+    const end = (/** @type {boolean} */ isMeant) => {
+      if (!open) return;
+      open = false;
+      this.naming = -1;
+      this.shown = '';
+      field.replaceWith(place);
+      if (!isMeant || field.value === name) return;
+      const call = (/** @type {string} */ called) => () => this.link.ask('rename', { number, name: called });
+      call(field.value)();
+      this.undo.act({ words: `branch named ${field.value || 'no more'}`, undo: call(name), redo: call(field.value) });
+    };
+    field.onkeydown = (event) => {
+      if (event.key === 'Enter' || event.key === 'Escape') end(event.key === 'Enter');
+      event.stopPropagation();
+    };
+    field.onblur = () => end(true);
+    place.replaceWith(field);
+    field.focus();
+    field.select();
+  }
+
+  /** Compare with a branch, or with none. @param {number | null} number @param {string} name */
+  choose(number, name) {
+    this.chosen = number;
+    for (const one of /** @type {NodeListOf<HTMLElement>} */ (this.find('others').querySelectorAll('[data-branch]')))
+      one.setAttribute('aria-pressed', String(one.dataset.branch === String(number)));
+    this.compare(number, name);
+  }
+}
