@@ -51,7 +51,7 @@ export class Controls {
       Home: ['restart', actions.restart],
       e: ['to the next event of the spec', actions.next],
       E: ['to the event before', actions.before],
-      b: ['from here on differently: what came after becomes another branch', actions.branch],
+      b: ['branch: go on differently from here, and keep what came after', actions.branch],
     };
     followKeys(this.keys);
   }

@@ -93,15 +93,15 @@ export function listKeys(dialog, keys) {
   }
   const grouped = GROUPS.flatMap(([, some]) => some),
     rest = Object.keys(keys).filter((key) => !grouped.includes(key));
+  const isTouched = matchMedia('(pointer: coarse)').matches;
   /** @type {typeof GROUPS} */
   const all = [...GROUPS, ['more', rest, []]];
   const list = /** @type {HTMLElement} */ (dialog.querySelector('#keylist'));
   list.replaceChildren(
     ...all.flatMap(([group, some, gestures]) => {
-      const rows = [
-        ...some.filter((key) => key in keys).flatMap((key) => row('kbd', CALLED[key] || key, keys[key][0])),
-        ...gestures.flatMap(([name, words]) => row('span', name, words)),
-      ];
+      const pressed = some.filter((key) => key in keys).flatMap((key) => row('kbd', CALLED[key] || key, keys[key][0])),
+        done = gestures.flatMap(([name, words]) => row('span', name, words)),
+        rows = isTouched ? [...done, ...pressed] : [...pressed, ...done];
       if (!rows.length) return [];
       const [section, heading, terms] = ['section', 'h3', 'dl'].map((tag) => document.createElement(tag));
       heading.textContent = group;
