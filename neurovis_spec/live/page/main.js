@@ -28,6 +28,7 @@ import { Refusal } from './refusal.js';
 import { download, savePng } from './save.js';
 import { say } from './say.js';
 import { Scrubber } from './scrubber.js';
+import { Share } from './share.js';
 import { withNumber } from './sliders.js';
 import { Strips } from './strips.js';
 import { told } from './told.js';
@@ -183,6 +184,7 @@ const link = new Link({
       const asking = /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('[data-asks]'));
       for (const one of asking) one.hidden = !link.takes.has(one.dataset.asks ?? '');
       controls.status(message);
+      share.status();
       scrubber.status(message);
       turning.status(message);
       undo.status(message);
@@ -235,6 +237,7 @@ const strips = new Strips(link, attention, beside, scrubber, axis, part('strips'
 const branches = new Branches(link, part, undo, (number, name) => strips.compare(number, name));
 const measuring = new Measuring(link, strips, part);
 const body = new Body(part('embodied'), part('posed'), part('bodily'), redraw);
+const share = new Share(link, camera, strips, attention, controls, body, redraw, part);
 
 /** Show the matrix in place of the picture, or the picture. @param {boolean} asMatrix */
 function choose(asMatrix) {
@@ -368,6 +371,7 @@ Object.assign(controls.keys, {
   y: ['open or close the panel of the body', () => body.toggle()],
   m: ['the matrix of the weights in place of the picture, and back', () => views.toggle()],
   g: ['each group as one node, with the pathways between them, and back', () => turning.appearance.toggle()],
+  f: ['present: the picture and the curves alone, and back', () => share.present()],
   c: ['add a curve by its name, or by a measure', () => measuring.toggle()],
   p: ['pin the curve of what is held, or unpin it', () => strips.toggle()],
   L: ['play the steps that are shown over and over, or go on', () => range.toggle()],

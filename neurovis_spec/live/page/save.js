@@ -21,9 +21,9 @@ export function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
-/** Save the whole picture as pixels, whatever part of it is seen, with the body below it. @param {Scene} scene
- * @param {Look} look @param {Body} body */
-export function savePng(scene, look, body) {
+/** The whole picture as a PNG, whatever part of it is seen, with the body below it. @param {Scene} scene
+ * @param {Look} look @param {Body} body @returns {Promise<Blob>} */
+export function pixelsOf(scene, look, body) {
   const canvas = document.createElement('canvas'),
     camera = new Camera(),
     { width, height, density } = scene;
@@ -34,7 +34,12 @@ export function savePng(scene, look, body) {
   new Drawing(scene).draw(context, camera, look);
   context.setTransform(density, 0, 0, density, 0, camera.window[1]);
   body.paint(context, width, BELOW, look, scene);
-  canvas.toBlob((blob) => {
-    if (blob) download(blob, `${scene.name}.png`);
+  return new Promise((done, failed) => {
+    canvas.toBlob((blob) => (blob ? done(blob) : failed(new Error('no picture'))));
   });
+}
+
+/** Save that. @param {Scene} scene @param {Look} look @param {Body} body */
+export async function savePng(scene, look, body) {
+  download(await pixelsOf(scene, look, body), `${scene.name}.png`);
 }

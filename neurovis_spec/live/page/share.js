@@ -1,0 +1,165 @@
+/**
+ * Sharing: where the page is, in its address, so that a link shows the same; and the picture alone, for a talk.
+ */
+
+import { pixelsOf } from './save.js';
+
+/** @typedef {import('./attention.js').Attention} Attention */
+/** @typedef {import('./body.js').Body} Body */
+/** @typedef {import('./camera.js').Camera} Camera */
+/** @typedef {import('./controls.js').Controls} Controls */
+/** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Look} Look */
+/** @typedef {import('./protocol.js').Scene} Scene */
+/** @typedef {import('./strips.js').Strips} Strips */
+
+/** How often the address is brought up to date, in milliseconds; how long it is told that something was copied. */
+const PACE = 500,
+  TOLD = 1500;
+/** What parts an item from what of it is shown, and items in one axis: no name has them. */
+const OF = '|',
+  WITH = '~';
+
+/** A finite number of a text, null where it is none. @param {string | null | undefined} text @returns {number | null} */
+const number = (text) => (text && Number.isFinite(Number(text)) ? Number(text) : null);
+
+/** What of a page a link holds. */
+export class Share {
+  /** @param {Link} link @param {Camera} camera @param {Strips} strips @param {Attention} attention @param {Controls} controls
+   * @param {Body} body @param {() => void} redraw @param {(id: string) => HTMLElement} part */
+  constructor(link, camera, strips, attention, controls, body, redraw, part) {
+    this.link = link;
+    this.camera = camera;
+    this.strips = strips;
+    this.attention = attention;
+    this.controls = controls;
+    this.redraw = redraw;
+    /** the curves that the page began with */
+    this.begun = '';
+    this.isBegun = false;
+    const address = part('link'),
+      picture = part('clip');
+    address.onclick = () => {
+      this.keep();
+      this.told(address, navigator.clipboard.writeText(location.href));
+    };
+    picture.onclick = () => {
+      const { scene, look } = this.link;
+      if (!scene || !look) return;
+      const png = pixelsOf(scene, look, body);
+      this.told(picture, navigator.clipboard.write([new ClipboardItem({ 'image/png': png })]));
+    };
+    part('present').onclick = () => this.present();
+    document.addEventListener('fullscreenchange', () => {
+      if (!document.fullscreenElement) document.documentElement.classList.remove('presenting');
+    });
+  }
+
+  /** Say on a button that something was copied, or that it could not be. @param {HTMLElement} button @param {Promise<void>} copied */
+  async told(button, copied) {
+    const words = button.dataset.words ?? button.textContent ?? '';
+    button.dataset.words = words;
+    try {
+      await copied;
+      button.textContent = 'copied';
+    } catch {
+      button.textContent = 'not allowed by the browser';
+    }
+    setTimeout(() => {
+      button.textContent = words;
+    }, TOLD);
+  }
+
+  /** Show the picture and the curves alone, as large as the screen, or all again. */
+  present() {
+    const isOn = document.documentElement.classList.toggle('presenting');
+    if (isOn) document.documentElement.requestFullscreen?.().catch(() => {});
+    else if (document.fullscreenElement) void document.exitFullscreen();
+  }
+
+  /** The scene and how the run stands are there: go to where the address says, and keep it up to date from then on. */
+  status() {
+    if (this.isBegun || !this.link.scene) return;
+    this.isBegun = true;
+    this.begun = this.curves();
+    if (location.protocol === 'about:') return;
+    this.restore(new URLSearchParams(location.hash.slice(1)));
+    setInterval(() => this.keep(), PACE);
+  }
+
+  /** The name of an item, which another network may have, too. @param {string} key @returns {string} */
+  named(key) {
+    const [id, what] = key.split('.'),
+      data = this.attention.groups.get(id)?.data;
+    const name = data?.neuron ?? data?.connection ?? id;
+    return what ? name + OF + what : name;
+  }
+
+  /** The item of a name, '' where there is none. @param {string} named @returns {string} */
+  item(named) {
+    const [name, what] = named.split(OF);
+    for (const { id, data } of this.attention.groups.values()) {
+      if ((data.neuron ?? data.connection) === name) return what ? `${id}.${what}` : id;
+    }
+    return /^e\d+$/.test(name) && this.strips.group(name) ? name : '';
+  }
+
+  /** The curves that are pinned, by their names. @returns {string} */
+  curves() {
+    return this.strips.pinned
+      .map(({ key, behind }) => [key, ...behind].map((one) => this.named(one)).join(WITH))
+      .join('\n');
+  }
+
+  /** What an address says of this page. @returns {string} */
+  state() {
+    const { camera, controls, link } = this,
+      said = new URLSearchParams(),
+      curves = this.curves();
+    if (!controls.playing && link.look) said.set('step', String(link.look.step));
+    if (controls.speed.value !== '1') said.set('speed', controls.speed.value);
+    const at = camera.unit(camera.window[0] / 2, camera.window[1] / 2);
+    const isWhole = camera.zoom === 1 && !camera.shift[0] && !camera.shift[1];
+    if (!isWhole) said.set('view', [camera.zoom, ...at].map((one) => one.toPrecision(6)).join(' '));
+    if (curves !== this.begun) said.set('curves', curves);
+    return said.toString();
+  }
+
+  /** Have the address say where the page is. */
+  keep() {
+    const state = this.state();
+    if (!this.link.look || this.camera.way || location.hash.slice(1) === state) return;
+    history.replaceState(null, '', state ? `#${state}` : location.pathname + location.search);
+  }
+
+  /** Go to where an address says. @param {URLSearchParams} said */
+  restore(said) {
+    const { camera, controls, link, strips } = this,
+      step = number(said.get('step')),
+      speed = said.get('speed'),
+      curves = said.get('curves');
+    const view = said.get('view')?.split(' ').map(number) ?? [];
+    if (view.length === 3 && !view.includes(null)) {
+      const [zoom, ...at] = /** @type {number[]} */ (view);
+      camera.way = null;
+      camera.zoom = Math.min(64, Math.max(0.25, zoom));
+      camera.shift = at.map((one, axis) => camera.scale * (camera.size[axis] / 2 - one));
+    }
+    if (curves !== null) {
+      strips.pinned = [];
+      const wanted = curves.split('\n').map((line) => line.split(WITH));
+      strips.begin(
+        wanted
+          .map((names) => ({
+            items: names.map((name) => this.item(name)),
+            names: names.map((name) => name.split(OF)[0]),
+          }))
+          .filter(({ items }) => items[0] && items.every(Boolean)),
+      );
+    }
+    if (controls.owner && [...controls.speed.options].some(({ value }) => value === speed))
+      link.ask('speed', { value: speed });
+    if (controls.owner && step !== null && Number.isSafeInteger(step) && step >= 0) link.ask('seek', { step });
+    this.redraw();
+  }
+}
