@@ -320,7 +320,7 @@ def test_a_viewer_moves_the_picture_instead(tmp_path: Path) -> None:
             await drag(opened, (x, y), (x + 60, y))
             await holds(opened, (x + 60, y), "O")
             assert desk.placed.moved == ()
-            for button in ("unplace", "tospec", "tofile", "svg", "npz", "film"):
+            for button in ("unplace", "tospec", "tofile", "svg", "pdf", "npz", "film"):
                 assert await opened.ask(f"document.querySelector('#{button}').disabled")
 
     asyncio.run(main())
@@ -388,6 +388,12 @@ def test_the_owner_has_the_picture_a_film_and_the_recording_as_files(tmp_path: P
             assert b"<svg" in (picture := await saved("svg", "cpg_rbf.svg"))
             (tmp_path / "cpg_rbf.svg").unlink()
             assert len(await saved("film", "cpg_rbf.svg")) > len(picture)
+            await opened.until("document.querySelector('#film').textContent == 'film of the last'")
+            assert (await saved("pdf", "cpg_rbf.pdf")).startswith(b"%PDF")
+            await opened.ask(
+                "document.querySelector('#seconds').value = 1; document.querySelector('#kind').value = 'gif'"
+            )
+            assert (await saved("film", "cpg_rbf.gif")).startswith(b"GIF")
             await saved("npz", "cpg_rbf.npz")
             found, run = nv.load(tmp_path / "cpg_rbf.npz"), record(desk.placed.compiled.network, Course(step + 1))
             assert (found.activity == run.activity).all()

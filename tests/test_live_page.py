@@ -43,7 +43,19 @@ def test_it_is_small_and_asks_nobody_else() -> None:
 
 def test_every_message_and_limit_is_documented() -> None:
     text = (ROOT / "docs/live.md").read_text(encoding="utf-8")
-    sent = {"status", "values", "findings", "refused", "moved", "placed", "saving", "body", "measured", "undefined"}
+    sent = {
+        "status",
+        "values",
+        "findings",
+        "refused",
+        "moved",
+        "placed",
+        "saving",
+        "making",
+        "body",
+        "measured",
+        "undefined",
+    }
     assert set(re.findall(r'\{"type": "(\w+)"', text)) == {*MESSAGES, *sent}
     for speed in SPEEDS:
         assert speed in text

@@ -3,27 +3,36 @@
 from __future__ import annotations
 
 import io
+import json
 import re
+import struct
 from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
+from queue import SimpleQueue
 
 import numpy as np
 import pytest
 import toy_bodies
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from PIL import Image
 from scenes import file_of, scene_of
 
 import neurovis_spec as nv
+from neurovis_spec.live.commands import Fetch, Seek
+from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.recorded import RecordedSource
+from neurovis_spec.live.run import Run
 from neurovis_spec.live.saving import film, picture, recording, steps_for, told_by
+from neurovis_spec.live.show import Show
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh
 from neurovis_spec.live.view import view_of
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.scene.film_size import frames_a_second
 
 COMPILED = nv.compile(Path(__file__).parents[1] / "specs/cpg_rbf.yaml")
 
@@ -61,7 +70,33 @@ def test_the_picture_is_that_of_render() -> None:
     view = view_of(COMPILED, COMPILED.gains)
     source = SimulatedSource(COMPILED.simulator())
     scene = scene_of(COMPILED, COMPILED.run(1).snapshot(0))
-    assert picture(view, told_by(source, 1)) == file_of(scene, ".svg")
+    for suffix in (".svg", ".pdf"):
+        assert picture(view, told_by(source, 1), suffix) == file_of(scene, suffix)
+
+
+def test_a_film_has_a_frame_for_each_step_and_says_how_far_it_is() -> None:
+    """Fetched as a page does: the answers are words of how far it is, then the file."""
+    network, answers = COMPILED, SimpleQueue[str | bytes]()
+    source, view = Show().stage(network)
+    run = Run(source, view, lambda _: None, lambda: False, playing=False)
+    desk = Desk(network, None, Show().view, run, lambda _: None)
+    run.start()
+    desk.start()
+    try:
+        run.ask(Seek(30))
+        desk.ask(Fetch("gif", 20 / frames_a_second(network.network)), answers.put)
+        words, answer = list[str](), answers.get(timeout=60)
+        while isinstance(answer, str):
+            words.append(json.loads(answer)["type"])
+            answer = answers.get(timeout=60)
+        assert set(words) == {"making"}
+        head = 4 + struct.unpack_from("<BxH", answer)[1]
+        assert answer[4:head].decode() == f"{network.name}.gif"
+        with Image.open(io.BytesIO(answer[head:])) as made:
+            assert getattr(made, "n_frames", 1) > 5
+    finally:
+        desk.end()
+        run.end()
 
 
 def test_what_was_lesioned_by_hand_is_faint_in_picture_and_film() -> None:

@@ -181,8 +181,10 @@ Command: TypeAlias = Showing | Branching | Loop | Unloop | Measure | Unmeasure |
 #: Where what was put by hand is written: into ``layout.positions`` of the spec, or into the layout file that the spec
 #: (then) names.
 Into: TypeAlias = Literal["spec", "file"]
-#: What can be had as a file.
-What: TypeAlias = Literal["svg", "film", "npz"]
+#: What can be had as a file: a picture, a film (``film`` is a moving SVG), a recording.
+What: TypeAlias = Literal["svg", "pdf", "film", "mp4", "webm", "gif", "npz"]
+#: Those of one step.
+STILLS: Final = frozenset({"svg", "pdf"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ looks on waits for it. While a neuron is dragged the latest place counts alone.
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,13 +18,21 @@ from typing import Final, TypeAlias
 from neurovis_spec.compilation import Compilation
 from neurovis_spec.diagnostics import SpecError, show_text
 from neurovis_spec.layout.model import Layout
-from neurovis_spec.live.commands import Appearance, Fetch, PlaceNeuron, Request, Save, Unplace, Write
+from neurovis_spec.live.commands import STILLS, Appearance, Fetch, PlaceNeuron, Request, Save, Unplace, Write
 from neurovis_spec.live.pins import Compile, Placed, Saving, SavingError, placed, saving
-from neurovis_spec.live.protocol import file_message, moved_message, placed_message, refused_message, saving_message
+from neurovis_spec.live.protocol import (
+    file_message,
+    making_message,
+    moved_message,
+    placed_message,
+    refused_message,
+    saving_message,
+)
 from neurovis_spec.live.run import Run, Stage
 from neurovis_spec.live.saving import Told, film, picture, recording, steps_for, told_by
 from neurovis_spec.live.source import Source, SourceError
 from neurovis_spec.live.view import View
+from neurovis_spec.progress import Progress
 
 #: Tells who has asked.
 Answer: TypeAlias = Callable[[str | bytes], None]
@@ -33,6 +42,8 @@ _WAITING: Final = 64
 _UNDONE: Final = 200
 #: Seconds in which the run has told its last steps.
 _PATIENCE: Final = 30.0
+#: Seconds between two words of how far a film is.
+_OFTEN: Final = 0.25
 
 
 @dataclass(frozen=True)
@@ -149,13 +160,14 @@ class Desk:
             case Write():
                 self._write(answer)
             case Fetch():
-                answer(self._fetch(request))
+                answer(self._fetch(request, answer))
 
-    def _fetch(self, request: Fetch) -> bytes:
-        """A file of what was shown."""
+    def _fetch(self, request: Fetch, answer: Answer) -> bytes:
+        """A file of what was shown; how far a film is is told meanwhile."""
         view, name = self._shown().dressed(request.theme), self._placed.compiled.name
         network = self._placed.compiled.network
-        steps = {"svg": 1, "npz": steps_for(network, None)}.get(request.what, steps_for(network, request.seconds))
+        seconds = None if request.what == "npz" else request.seconds
+        steps = 1 if request.what in STILLS else steps_for(network, seconds)
         found: SimpleQueue[Told | str] = SimpleQueue()
 
         def look(source: Source) -> None:
@@ -172,7 +184,10 @@ class Desk:
             raise SavingError(told)
         if request.what == "npz":
             return file_message(f"{name}.npz", recording(network, told))
-        return file_message(f"{name}.svg", picture(view, told) if request.what == "svg" else film(view, told))
+        suffix = ".svg" if request.what == "film" else f".{request.what}"
+        if request.what in STILLS:
+            return file_message(f"{name}{suffix}", picture(view, told, suffix))
+        return file_message(f"{name}{suffix}", film(view, told, suffix, _telling(answer)))
 
     def _written(self) -> Written:
         if self._spec is None:
@@ -214,6 +229,19 @@ class Desk:
     def _say(self) -> None:
         """Tell everybody what is put by hand."""
         self._tell(placed_message(self._placed.moved, undo=bool(self._before), files=self._spec is not None))
+
+
+def _telling(answer: Answer) -> Progress:
+    """What tells now and then how far something is."""
+    last = [-_OFTEN]
+
+    def tell(done: int, total: int) -> None:
+        now = time.monotonic()
+        if now - last[0] >= _OFTEN:
+            last[0] = now
+            answer(making_message(done, total))
+
+    return tell
 
 
 def _replaces(request: Request, before: Request) -> bool:

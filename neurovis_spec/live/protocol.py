@@ -14,7 +14,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from operator import attrgetter
-from typing import Final, TypeAlias
+from typing import Final, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -51,6 +51,7 @@ from neurovis_spec.live.commands import (
     Unloop,
     Unmeasure,
     Unplace,
+    What,
     Write,
 )
 from neurovis_spec.live.drawing import Moved
@@ -277,6 +278,11 @@ def placed_message(neurons: Sequence[str], undo: bool, files: bool) -> str:
 def saving_message(files: Sequence[str], diff: str, written: bool) -> str:
     """What would change in which files, or that these are written."""
     return _text("saving", files=list(files), diff=diff, written=written)
+
+
+def making_message(done: int, total: int) -> str:
+    """How far a file is that was asked for."""
+    return _text("making", done=done, total=total)
 
 
 def refused_message(reason: str) -> str:
@@ -570,7 +576,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "unplace": ({}, Unplace),
     "save": ({"into": _one_of("spec", "file")}, Save),
     "write": ({}, Write),
-    "fetch": ({"what": _one_of("svg", "film", "npz"), "seconds": _seconds}, Fetch),
+    "fetch": ({"what": _one_of(*get_args(What)), "seconds": _seconds}, Fetch),
 }
 #: Members that a message need not have.
 _OPTIONAL: Final = {"moving", "pathways", "rasters", "pairs", "branch"}

@@ -22,6 +22,7 @@ from neurovis_spec.language.expressions.tree import Name, Number
 from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen, Source
 from neurovis_spec.live.turns import Lesion, Mend, Set, Turned, Weigh
 from neurovis_spec.live.view import View
+from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.columns import Numbers, Probe, columns_of, recording_of
 from neurovis_spec.runtime.fitting import with_spikes
 from neurovis_spec.runtime.names import names_of
@@ -114,14 +115,15 @@ def told_by(source: Source, steps: int) -> Told:
     return Told(source.recall(steps), source.after(), source.turned, source.body, source.backend)
 
 
-def picture(view: View, told: Told) -> bytes:
-    """The last step as SVG, with the body that is drawn."""
-    return drawing(still(_film(view, replace(told, seen=told.seen[-1:])), 0), ".svg")
+def picture(view: View, told: Told, suffix: str = ".svg") -> bytes:
+    """The last step, with the body that is drawn. Raises RendererError."""
+    return drawing(still(_film(view, replace(told, seen=told.seen[-1:])), 0), suffix)
 
 
-def film(view: View, told: Told) -> bytes:
-    """Steps as a moving SVG, with the body that is drawn."""
-    return renderer_for(".svg", moving=True).animate(_film(view, told), ".svg")
+def film(view: View, told: Told, suffix: str = ".svg", progress: Progress | None = None) -> bytes:
+    """Steps as a film, by default a moving SVG, with the body that is drawn. Raises RendererError where nobody here
+    makes films of this kind."""
+    return renderer_for(suffix, moving=True).animate(_film(view, told), suffix, progress)
 
 
 def _film(view: View, told: Told) -> Film:

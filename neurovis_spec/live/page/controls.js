@@ -70,7 +70,7 @@ export class Controls {
     this.speed.value = status.speed;
     this.rate.status(status);
     this.owner = status.owner;
-    for (const id of ['restart', 'back', 'play', 'step', 'speed', 'before', 'next', 'svg', 'npz', 'film']) {
+    for (const id of ['restart', 'back', 'play', 'step', 'speed', 'before', 'next', 'svg', 'pdf', 'npz', 'film']) {
       const isEvent = id === 'before' || id === 'next';
       /** @type {HTMLButtonElement} */ (part(id)).disabled = !status.owner || (isEvent && !status.events.length);
     }

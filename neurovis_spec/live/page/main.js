@@ -172,6 +172,7 @@ const link = new Link({
     outline.hold();
   },
   file(name, blob) {
+    share.made();
     download(blob, name);
   },
   frame() {
@@ -203,7 +204,9 @@ const link = new Link({
       placing.saving(message);
       if (message.written) controls.tell(`saved ${message.files.join(', ')}`);
     } else if (message.type === 'measured') measuring.take(message);
+    else if (message.type === 'making') share.making(message.done, message.total);
     else if (message.type === 'refused') {
+      share.made();
       refusal.tell(message.reason);
       undo.refused();
       if (placing.waiting) placing.cancel();
@@ -337,8 +340,12 @@ function help() {
 part('png').onclick = () => {
   if (link.scene && link.look) savePng(link.scene, link.look, body);
 };
-for (const what of ['svg', 'npz']) part(what).onclick = () => link.ask('fetch', { what, seconds: 1 });
-part('film').onclick = () => withNumber(part('seconds'), (seconds) => link.ask('fetch', { what: 'film', seconds }));
+for (const what of ['svg', 'pdf', 'npz']) part(what).onclick = () => link.ask('fetch', { what, seconds: 1 });
+part('film').onclick = () =>
+  withNumber(part('seconds'), (seconds) => {
+    link.ask('fetch', { what: /** @type {HTMLSelectElement} */ (part('kind')).value, seconds });
+    share.making(0, 1);
+  });
 part('help').onclick = help;
 const views = { toggle: () => choose(!matrix) };
 part('matrix').onclick = () => views.toggle();

@@ -55,6 +55,7 @@ import { isStill } from './camera.js';
  * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
  *   | {type: 'body', skeleton: Skeleton | null, start: number[]}
+ *   | {type: 'making', done: number, total: number}
  *   | {type: 'findings', text: string, errors: boolean}
  *   | Nonfinite
  *   | {type: 'moved', discs: Object<string, number[]>, lines: Object<string, number[][]>}

@@ -37,6 +37,7 @@ export class Share {
     /** the curves that the page began with */
     this.begun = '';
     this.isBegun = false;
+    this.film = /** @type {HTMLButtonElement} */ (part('film'));
     const address = part('link'),
       picture = part('clip');
     address.onclick = () => {
@@ -68,6 +69,19 @@ export class Share {
     setTimeout(() => {
       button.textContent = words;
     }, TOLD);
+  }
+
+  /** Say how far a film is. @param {number} done @param {number} total */
+  making(done, total) {
+    this.film.textContent = `making it, ${Math.floor((100 * done) / Math.max(1, total))} %`;
+    this.film.disabled = true;
+  }
+
+  /** It is there, or will not be. */
+  made() {
+    if (!this.film.disabled) return;
+    this.film.textContent = 'film of the last';
+    this.film.disabled = !this.controls.owner;
   }
 
   /** Show the picture and the curves alone, as large as the screen, or all again. */
