@@ -60,7 +60,8 @@ def compile_listed(listed: Listed) -> CompiledNetwork:
     """The network of what is listed. Raises SpecError."""
     if listed.path is None:
         return api.compile_text(listed.text, file=listed.name)
-    return api.compile(listed.path)
+    here = Path.cwd()
+    return api.compile(listed.path.relative_to(here) if listed.path.is_relative_to(here) else listed.path)
 
 
 def draw_listed(listed: Listed) -> tuple[str, Iterable[Path]]:
