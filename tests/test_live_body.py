@@ -56,7 +56,7 @@ async def shown(source: Source, folder: Path, theme: str = "default") -> AsyncIt
     run.start()
     try:
         async with chromium(folder) as opened:
-            await opened.size(1000, 800)
+            await opened.size(1000, 1000)
             await opened.call("Page.navigate", url=access.url())
             await opened.until(f"{STEP} >= 0")
             await pause(opened)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from chromium import Page, chromium
+from live_window import area_of, fit
 from PIL import Image
 from renderer_conformance import similarity
 from scenes import file_of, scene_of
@@ -36,18 +37,11 @@ SPECS = Path(__file__).parents[1] / "specs"
 STEP = "Number(document.querySelector('#told')?.textContent.split(' ')[1])"
 
 
-async def fit(opened: Page, width: int, height: int, density: float = 1.0) -> None:
-    """Have the picture so large, whatever stands below it."""
-    below = await opened.ask("innerHeight - document.querySelector('#stage').offsetHeight")
-    assert isinstance(below, int)
-    await opened.size(width, height + below, density)
-
-
 @asynccontextmanager
 async def shown(
     spec: str, folder: Path, theme: str | None = None, takes: frozenset[str] | None = None, curves: bool = False
 ) -> AsyncIterator[tuple[Page, nv.CompiledNetwork, Access]]:
-    """A live view of an example, opened in a window that shows its picture a pixel a pixel; of what its source takes
+    """A live view of an example, opened in a window that shows its network a pixel a pixel; of what its source takes
     only these messages count, where they are given. Unless ``curves`` are wanted, those that it begins with are
     unpinned."""
     compiled = nv.compile(SPECS / spec)
@@ -62,8 +56,7 @@ async def shown(
     server = Server(access, hub, run)
     await server.start(sock)
     run.start()
-    frame = view.plan.frame
-    width, height = round(frame.width * frame.density), round(frame.height * frame.density)
+    width, height = area_of(view).size
     try:
         async with chromium(folder) as opened:
             await opened.size(width, height)
@@ -103,7 +96,8 @@ def test_the_page_shows_the_picture_that_render_draws(spec: str, theme: str, tmp
             snapshot = compiled.run(step + 1).snapshot(step)
             scene = scene_of(compiled, snapshot, settings=settings)
             drawn = Image.open(io.BytesIO(file_of(scene, ".png"))).convert("RGB")
-            seen = taken.crop((0, 0, *drawn.size))
+            area = area_of(view_of(compiled, compiled.gains, theme))
+            seen, drawn = area.seen(taken), area.drawn(drawn)
             seen.save(tmp_path / "seen.png")
             drawn.save(tmp_path / "drawn.png")
         assert similarity(seen, drawn) >= 0.98
@@ -166,7 +160,8 @@ def test_the_page_shows_how_lines_end_their_styles_and_what_stands_for_many(
             taken = Image.open(io.BytesIO(await opened.shot())).convert("RGB")
             (snapshot,) = snapshots_of(compiled.network, compiled.run(step + 1), [step])
             drawn = Image.open(io.BytesIO(file_of(scene_of(compiled, snapshot), ".png"))).convert("RGB")
-            seen = taken.crop((0, 0, *drawn.size))
+            area = area_of(view_of(compiled, compiled.gains))
+            seen, drawn = area.seen(taken), area.drawn(drawn)
         seen.save(tmp_path / "seen.png")
         drawn.save(tmp_path / "drawn.png")
         assert similarity(seen, drawn) >= 0.98
@@ -189,7 +184,8 @@ def test_two_thousand_lines_are_those_of_render_on_a_display_of_two_pixels_a_pix
         async with shown(str(tmp_path / "dense.yaml"), tmp_path) as (opened, compiled, _):
             step = await pause(opened)
             scene = scene_of(compiled, compiled.run(step + 1).snapshot(step))
-            width, height = round(scene.width * scene.density), round(scene.height * scene.density)
+            area = area_of(view_of(compiled, compiled.gains))
+            width, height = area.size
             await fit(opened, width, height, density=2.0)
             await opened.shot()  # headless, a page that stands still notices another display when it is looked at
             await opened.until(f"document.querySelector('#picture').width == {2 * width}")
@@ -197,7 +193,7 @@ def test_two_thousand_lines_are_those_of_render_on_a_display_of_two_pixels_a_pix
             taken = Image.open(io.BytesIO(await opened.shot())).convert("RGB")
             sharp = replace(scene, density=2 * scene.density)
             drawn = Image.open(io.BytesIO(file_of(sharp, ".png"))).convert("RGB")
-            seen = taken.crop((0, 0, *drawn.size))
+            seen, drawn = area.seen(taken, 2), area.drawn(drawn, 2)
             seen.save(tmp_path / "seen.png")
             drawn.save(tmp_path / "drawn.png")
             assert len(compiled.network.connections) > 1900
@@ -251,9 +247,9 @@ def test_it_is_opened_again_and_shows_the_same_sharp_on_a_display_of_two_pixels_
             step = await pause(opened)
             await opened.call("Page.reload")
             await opened.until(f"document.readyState == 'complete' && {STEP} == {step}")
-            await opened.size(700, 500, density=2.0)
+            await opened.size(700, 800, density=2.0)
             await opened.until("document.querySelector('#picture').width == 1400")
-            await opened.size(700, 500)
+            await opened.size(700, 800)
             await opened.key("ArrowLeft")
             await opened.until("document.querySelector('#picture').width == 700")
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import Page, chromium
+from live_window import HEAD, area_of
 from PIL import Image
 from test_live_browser import STEP, pause, shown
 from test_live_looking import TIP, places, told
@@ -189,11 +190,12 @@ def test_it_says_what_is_asked_and_nothing_while_it_plays(tmp_path: Path) -> Non
     asyncio.run(main())
 
 
-async def title_at(opened: Page) -> tuple[int, int]:
-    """Where the title of the picture begins, in pixels of the page: the leftmost and the topmost of its ink."""
+async def network_at(opened: Page) -> tuple[int, int]:
+    """Where the network begins, in pixels of its picture: the leftmost and the topmost of its ink."""
     await asyncio.sleep(0.4)  # for pictures on their way
-    taken = np.asarray(Image.open(io.BytesIO(await opened.shot())).convert("L"))[:200]
-    down, across = np.nonzero(taken < 90)
+    high = int(str(await opened.ask("picture.clientHeight")))
+    taken = np.asarray(Image.open(io.BytesIO(await opened.shot())).convert("L"))[HEAD : HEAD + high, :800]
+    down, across = np.nonzero(taken < 170)
     return int(across.min()), int(down.min())
 
 
@@ -201,14 +203,14 @@ def test_the_picture_is_moved_by_keys(tmp_path: Path) -> None:
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
             await pause(opened)
-            before = await title_at(opened)
+            before = await network_at(opened)
             await opened.key("h")
             await opened.key("k")
-            after = await title_at(opened)
+            after = await network_at(opened)
             assert after[0] > before[0] + 20
             assert after[1] > before[1] + 20
             await opened.key("0")
-            assert await title_at(opened) == before
+            assert await network_at(opened) == before
             await opened.ask("document.querySelector('#scrub').focus()")
             await opened.key("t")
             await opened.until("!document.querySelector('#turning').hidden")
@@ -237,7 +239,7 @@ def test_no_panel_lies_on_the_picture_nor_the_tooltip_elsewhere(tmp_path: Path) 
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
             await pause(opened)
-            await opened.size(1300, 800)
+            await opened.size(1300, 1100)
             edges = "(name => { const {left, right} = document.getElementById(name).getBoundingClientRect(); "
             for key in ("t", "o"):
                 await opened.key(key)
@@ -273,10 +275,8 @@ def test_on_a_telephone_two_fingers_come_closer_and_a_tap_holds(tmp_path: Path) 
     async def main() -> None:
         async with telephone("cpg_rbf.yaml", tmp_path) as (opened, compiled):
             await pause(opened)
-            frame, (x, y) = view_of(compiled, compiled.gains).plan.frame, places(compiled)["O"]
-            high = await opened.ask("document.querySelector('#picture').clientHeight")
-            scale = 390 / (frame.width * frame.density)
-            await tap(opened, (scale * x, (float(str(high)) - scale * frame.height * frame.density) / 2 + scale * y))
+            area, high = area_of(view_of(compiled, compiled.gains)), await opened.ask("picture.clientHeight")
+            await tap(opened, area.within((390, float(str(high))), places(compiled)["O"]))
             await tap(opened)
             await told(opened, "O")
             (tmp_path / "held.png").write_bytes(await opened.shot())

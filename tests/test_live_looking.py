@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import Page
+from live_window import HEAD, area_of, fit
 from PIL import Image
 from test_live_browser import pause, shown
 
@@ -20,12 +21,16 @@ from neurovis_spec.live.view import view_of
 
 pytestmark = pytest.mark.browser
 
+#: Pixels that are free above and below the network where tooltips need them.
+BESIDE = 150
+
 TIP = "document.querySelector('#tip')"
 
 
 def places(compiled: Compilation) -> dict[str, tuple[float, float]]:
     """Where the window of ``shown`` has each neuron, and the end of each connection."""
-    scene = json.loads(gzip.decompress(view_of(compiled, compiled.gains).content))
+    view = view_of(compiled, compiled.gains)
+    scene, area = json.loads(gzip.decompress(view.content)), area_of(view)
     result = {}
     for group in scene["groups"]:
         name = group["data"].get("neuron") or group["data"].get("connection")
@@ -34,7 +39,7 @@ def places(compiled: Compilation) -> dict[str, tuple[float, float]]:
             if "neuron" not in group["data"]:  # a little before the tip of the arrow
                 along = group["shapes"][1]["along"]
                 at = [at[axis] - 8 * along[axis] for axis in (0, 1)]
-            result[name] = (at[0] * scene["density"], at[1] * scene["density"])
+            result[name] = area.at(*at)
     return result
 
 
@@ -49,11 +54,12 @@ async def told(opened: Page, name: str) -> list[str]:
 
 def bends(compiled: nv.CompiledNetwork) -> dict[str, tuple[tuple[str, str], list[tuple[float, float]]]]:
     """The ends of each connection, and the points halfway along the pieces of its line in the window of ``shown``."""
-    scene = json.loads(gzip.decompress(view_of(compiled, compiled.gains).content))
+    view = view_of(compiled, compiled.gains)
+    scene, area = json.loads(gzip.decompress(view.content)), area_of(view)
     result = {}
     for group in scene["groups"]:
         if "connection" in group["data"]:
-            points = np.reshape(group["shapes"][0]["points"], (-1, 2)) * scene["density"]
+            points = np.array([area.at(x, y) for x, y in np.reshape(group["shapes"][0]["points"], (-1, 2))])
             pieces = [points[first : first + 4] for first in range(0, len(points) - 3, 3)]
             middles = [(a + 3 * b + 3 * c + d) / 8 for a, b, c, d in pieces]
             found = [(float(x), float(y)) for x, y in [*middles, *points[::3]]]
@@ -65,7 +71,12 @@ def test_the_tooltip_does_not_lie_on_what_it_tells_of(tmp_path: Path) -> None:
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
             await pause(opened)
-            lines, at = bends(compiled), places(compiled)
+            wide, high = area_of(view_of(compiled, compiled.gains)).size
+            await fit(opened, wide, high + 2 * BESIDE)  # so that there is room for it
+            at = {name: (x, y + BESIDE) for name, (x, y) in places(compiled).items()}
+            lines = {
+                name: (ends, [(x, y + BESIDE) for x, y in points]) for name, (ends, points) in bends(compiled).items()
+            }
 
             async def covered(points: list[tuple[float, float]]) -> int:
                 await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
@@ -145,7 +156,7 @@ def test_a_click_holds_until_escape_and_the_rest_recedes(tmp_path: Path) -> None
             held = await colours("K2", "O", "K5")
             assert held[:2] == before[:2]
             assert min(held[2]) > min(before[2])
-            await opened.click(2, 2)
+            await opened.click(12, HEAD + 40)
             await opened.until(f"{TIP}.hidden")
 
     asyncio.run(main())

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import Page
+from live_window import HEAD
 from test_live_browser import STEP, pause, shown
 from test_live_looking import places, told
 
@@ -269,7 +270,7 @@ def test_the_matrix_is_in_place_of_the_picture_with_the_same_click(tmp_path: Pat
                 opened, *(f"document.querySelector('#picture').{s}" for s in ("width", "height"))
             )
             scale = min(across / size, down / size)
-            left, top = (across - scale * size) / 2, (down - scale * size) / 2
+            left, top = (across - scale * size) / 2, HEAD + (down - scale * size) / 2
 
             def cell(source: str, target: str) -> tuple[float, float]:
                 row, column = names.index(source), names.index(target)

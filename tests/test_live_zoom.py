@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import Page
+from live_window import area_of, fit
 from PIL import Image
-from test_live_browser import fit, pause, shown
+from test_live_browser import pause, shown
 from test_live_drawing import opened as drawn_alone
 from test_live_looking import TIP, places, told
 
@@ -46,7 +47,7 @@ def test_near_by_discs_grow_while_lines_and_labels_keep_their_weight(tmp_path: P
 
             def ring(pixels: np.ndarray) -> tuple[int, int]:
                 """Where the ring of the disc begins to the right of its middle, and how thick it is."""
-                row = pixels[round(y) + 12, round(x) :]
+                row = pixels[round(y) - 20, round(x) :]
                 inside = row[8]
                 other = np.flatnonzero(np.abs(row[8:] - inside).sum(axis=1) > 60) + 8
                 first = int(other[0])
@@ -71,10 +72,9 @@ def test_at_a_distance_boxes_are_closed_and_have_the_mean_colour_of_their_neuron
             (instance,) = (entry for entry in network.instances if entry.path == "left1")
             at = np.mean([places(compiled)[network.neurons.names[index]] for index in instance.indices], axis=0)
             await fit(opened, 360, 285)
-            await fit(opened, 360, 285)
             small = await picture(opened)
             small.save(tmp_path / "closed.png")
-            x, y = 0.25 * at
+            x, y = area_of(view).within((360, 285), (at[0], at[1]))
             await opened.point(x, y)
             await opened.until(f"{TIP}.textContent.startsWith('left1\\nmean ')")
             words = str(await opened.ask(f"{TIP}.textContent")).split("\n")
@@ -105,9 +105,9 @@ def test_dotted_lines_recede_too_where_something_else_is_held(tmp_path: Path) ->
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
             await pause(opened)
             (signal,) = (group for group in view_of(compiled, compiled.gains).plan.back if "signal" in group.data)
-            density, spline = view_of(compiled, compiled.gains).plan.frame.density, signal.shapes[0]
+            area, spline = area_of(view_of(compiled, compiled.gains)), signal.shapes[0]
             assert isinstance(spline, Spline)
-            points = np.array(spline.points) * density
+            points = np.array([area.at(*point) for point in spline.points])
             left, top = np.floor(points.min(axis=0) - 3).tolist()
             right, bottom = np.ceil(points.max(axis=0) + 3).tolist()
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
+from neurovis_spec.live.room import network_rect
 from neurovis_spec.scene import (
     FAMILIES,
     HALO,
@@ -67,6 +68,7 @@ def content(
         "width": scene.width,
         "height": scene.height,
         "density": scene.density,
+        "network": [_short(value) for value in network_rect(scene)],
         "theme": asdict(scene.theme),
         "dt": network.dt if network.dt_given else None,
         "time": None if time is None else {"step": time.length, "unit": time.unit},

@@ -35,7 +35,7 @@ const SIDES = [
 const ITEM = /^[nc]\d+$/;
 
 /** Points along a cubic spline. @param {number[]} points @returns {number[][]} */
-function along(points) {
+export function along(points) {
   const found = [];
   for (let first = 0; first + 7 < points.length; first += 6) {
     for (let t = 0; t < 1; t += 1 / 16) {

@@ -8,11 +8,15 @@ const GLIDE = 250;
 /** Whether the page is to move as little as can be. @returns {boolean} */
 export const isStill = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
 
-/** A picture of `width` by `height` units is fitted into the window; `zoom` and `shift` (pixels) come on top. */
+/** A part of a picture, of a `size` from a `corner` on (units), is fitted into the window; `zoom` and `shift` (pixels) come on top. */
 export class Camera {
   constructor() {
     this.size = [1, 1];
+    this.corner = [0, 0];
     this.window = [1, 1];
+    /** how many pixels are left free on each side of what is fitted in, and the most pixels that a unit then has */
+    this.edge = 0;
+    this.most = Infinity;
     this.zoom = 1;
     this.shift = [0, 0];
     /** where it is on the way to: zoom and shift, and those where it began @type {{to: number[], from: number[], since: number} | null} */
@@ -26,7 +30,8 @@ export class Camera {
 
   /** Pixels for a unit where all of the picture is seen. @returns {number} */
   get whole() {
-    return Math.min(this.window[0] / this.size[0], this.window[1] / this.size[1]);
+    const room = this.window.map((length) => Math.max(1, length - 2 * this.edge));
+    return Math.min(room[0] / this.size[0], room[1] / this.size[1], this.most);
   }
 
   /** Pixels for a unit. @returns {number} */
@@ -36,7 +41,8 @@ export class Camera {
 
   /** Where the origin of the picture lies. @returns {number[]} */
   get origin() {
-    return [0, 1].map((at) => (this.window[at] - this.scale * this.size[at]) / 2 + this.shift[at]);
+    const { window, scale, size, corner, shift } = this;
+    return [0, 1].map((at) => (window[at] - scale * size[at]) / 2 - scale * corner[at] + shift[at]);
   }
 
   /** The unit under a pixel. @param {number} x @param {number} y @returns {number[]} */
@@ -71,7 +77,17 @@ export class Camera {
     const scale = Math.max(least, Math.min(this.window[0] / (x1 - x0), this.window[1] / (y1 - y0)));
     const zoom = Math.min(64, Math.max(0.25, scale / this.whole)),
       at = zoom * this.whole;
-    this.go([zoom, (at * (this.size[0] - x0 - x1)) / 2, (at * (this.size[1] - y0 - y1)) / 2]);
+    const { size, corner } = this;
+    this.go([zoom, (at * (size[0] + 2 * corner[0] - x0 - x1)) / 2, (at * (size[1] + 2 * corner[1] - y0 - y1)) / 2]);
+  }
+
+  /** See what has the place `at` (pixels) for the origin of the picture, with so many pixels for a unit, at once.
+   * @param {number} scale @param {number[]} at */
+  stand(scale, at) {
+    this.way = null;
+    this.zoom = scale / this.whole;
+    this.shift = [0, 0];
+    this.shift = this.origin.map((from, axis) => at[axis] - from);
   }
 
   /** Go to a zoom and a shift, at once where little is to move. @param {number[]} to */

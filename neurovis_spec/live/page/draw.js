@@ -259,14 +259,21 @@ export class Drawing {
     this.dressed = dressed;
     const before = this.pictures,
       isWord = (/** @type {Shape} */ shape) => shape.kind === 'text' && shape.onDisc;
-    /** @param {Context} context @param {(Line | Disc)[]} items */
+    /** whether something recedes @param {string} id */
+    const isFar = (id) => near.size > 0 && !near.has(id);
+    /** What lies on lines and discs; of what recedes the labels can still be read. @param {Context} context
+     * @param {(Line | Disc)[]} items */
     const draw = (context, items) => {
-      for (const { rest, laid } of items) {
-        context.globalAlpha = laid ? laid.share : 1;
-        for (const shape of rest) if (!isWord(shape)) this.shape(context, shape);
+      for (const { id, rest, laid } of items) {
+        for (const shape of rest) {
+          const isRead = shape.kind === 'text' && isFar(id);
+          if (isWord(shape) && !isRead) continue;
+          context.globalAlpha = isRead || !laid ? 1 : laid.share;
+          this.shape(context, isRead ? { ...shape, fill: this.scene.theme.muted } : shape);
+        }
       }
     };
-    const words = discs.flatMap(({ rest }) => rest.filter(isWord)),
+    const words = discs.flatMap(({ id, rest }) => (isFar(id) ? [] : rest.filter(isWord))),
       beads = lines.filter(({ rest }) => rest.length);
     this.pictures = {
       back: this.picture(camera, [], (context) => {

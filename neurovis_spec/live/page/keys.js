@@ -64,7 +64,7 @@ const GROUPS = [
       ['click beside', 'let go'],
     ],
   ],
-  ['views', ['m', 'g', 'y', 'f'], []],
+  ['views', ['m', 'g', 'y', 'i', 'f'], []],
   [
     'changing',
     ['t', 'shift+←', 'shift+→', 'shift+↑', 'shift+↓', 'z', 'ctrl+z', 'ctrl+shift+z'],

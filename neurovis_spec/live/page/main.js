@@ -12,6 +12,7 @@ import { channels, luminance } from './colours.js';
 import { Controls, part } from './controls.js';
 import { Drawing } from './draw.js';
 import { listKeys } from './keys.js';
+import { Legend } from './legend.js';
 import { Marks } from './marks.js';
 import { Matrix } from './matrix.js';
 import { Measuring } from './measuring.js';
@@ -25,6 +26,7 @@ import { Pointer } from './pointer.js';
 import { Link } from './protocol.js';
 import { Range } from './range.js';
 import { Refusal } from './refusal.js';
+import { bare, frame, Room, staying } from './room.js';
 import { download, savePng } from './save.js';
 import { say } from './say.js';
 import { Scrubber } from './scrubber.js';
@@ -91,6 +93,7 @@ function show() {
   outline.show(look);
   turning.weight.show(attention.values);
   controls.frame(look);
+  part('caption').textContent = look.caption;
   scrubber.show(look);
   axis.show();
   strips.show();
@@ -118,7 +121,9 @@ function resize() {
     matchMedia(`(resolution: ${density}dppx)`).addEventListener('change', redraw, { once: true });
   }
   camera.window = [Math.max(1, Math.round(box.width * density)), Math.max(1, Math.round(box.height * density))];
+  if (link.scene) frame(camera, link.scene, matrix?.size);
   [canvas.width, canvas.height] = camera.window;
+  room.place();
   blank();
   redraw();
 }
@@ -130,8 +135,12 @@ const link = new Link({
       isBefore = false;
       return;
     }
+    const network = bare(scene),
+      stays = staying(camera, zoom.scene, network);
     pointer.cancel();
-    zoom.use(scene);
+    zoom.use(network);
+    legend.use(scene);
+    room.use(network, stays !== undefined);
     drawing = null;
     document.title = `${scene.title} – NeuroVis`;
     const names = { back: 'background', ink: 'ink', muted: 'muted', line: 'box_line', fill: 'box_fill' };
@@ -140,8 +149,10 @@ const link = new Link({
     style.colorScheme = luminance(channels(scene.theme.background)) < 0.18 ? 'dark' : 'light';
     if (first) blank();
     choose(matrix !== null);
+    if (!matrix) stays?.();
     part('titled').textContent = scene.title;
     beside.use(scene);
+    part('notes').textContent = scene.groups.find(({ id }) => id === 'notes')?.title ?? '';
     attention.use(scene);
     strips.use();
     measuring.use(scene);
@@ -221,6 +232,8 @@ const link = new Link({
   },
 });
 const controls = new Controls(link);
+const legend = new Legend(part('legend')),
+  room = new Room(camera, legend, part);
 const turning = new Turning(link, part);
 const undo = new Undo(link, part, told);
 const refusal = new Refusal(part('refusal'));
@@ -249,7 +262,7 @@ function choose(asMatrix) {
   const cells = asMatrix ? new Matrix(scene) : null,
     changed = !cells !== !matrix;
   matrix = cells;
-  camera.size = cells ? cells.size : [scene.width, scene.height];
+  frame(camera, scene, cells?.size);
   if (changed) camera.fit();
   attention.spot = cells && ((id) => cells.at(id));
   canvas.setAttribute('aria-label', cells ? `${scene.title}, the matrix of its weights` : scene.title);
@@ -376,6 +389,7 @@ Object.assign(controls.keys, {
   v: ['say what is held with its value, or how the run stands', tellAll],
   t: ['open or close the panel of parameters', () => turning.toggle()],
   y: ['open or close the panel of the body', () => body.toggle()],
+  i: ['fold or unfold the legend', () => legend.toggle()],
   m: ['the matrix of the weights in place of the picture, and back', () => views.toggle()],
   g: ['each group as one node, with the pathways between them, and back', () => turning.appearance.toggle()],
   f: ['present: the picture and the curves alone, and back', () => share.present()],

@@ -20,7 +20,7 @@ import { isStill } from './camera.js';
  *   headOfWidth: number, headMore: number, notch: number, bar: number, lap: number, faint: number, levels: number,
  *   fineness: number, shares: number, share: number, isBar: number, isFaint: number, isNegative: number,
  *   isClamped: number, isUndefined: number, scale: number, left: number, top: number}} Constants */
-/** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
+/** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number, network: number[],
  *   theme: Theme, dt: number | null,
  *   time: {step: number, unit: string} | null, discs: number, lines: number, parameters: Declared[],
  *   ranges: [number | null, number | null, number][], ranged: number[],

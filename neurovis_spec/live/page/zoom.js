@@ -17,6 +17,10 @@ const TINY = 3,
   ROOMY = 150;
 /** The size of a closed box's name, in pixels of a page. */
 const NAMED = 12;
+/** How large labels grow with what they are of, those on discs and others, in pixels of a page; those are larger alone
+ * that are so in the picture. */
+const ON_DISC = 28,
+  BESIDE = 16;
 /** The level of a neuron whose activity is no finite number. */
 const NONE = -128;
 
@@ -38,8 +42,10 @@ export class Zoom {
     this.made = null;
     /** what it was made for, and from where it was last seen */
     this.key = this.from = '';
-    /** how thick lines are, and how large labels, beside the picture's */
+    /** how thick lines are beside the picture's, pixels of a page for a unit, and whether all is as in the picture */
     this.ink = 1;
+    this.scale = 1;
+    this.isPlain = true;
   }
 
   /** Another network. @param {Scene} scene */
@@ -99,12 +105,14 @@ export class Zoom {
     const from = [camera.scale, camera.whole, devicePixelRatio].join();
     if (!scene || (this.made && from === this.from)) return this.made;
     this.from = from;
-    const ink = Math.min(1, Math.max(scene.density * devicePixelRatio, camera.whole) / camera.scale),
+    const least = Math.max(scene.density * devicePixelRatio, camera.whole) / camera.scale,
+      ink = least > 0.999 ? 1 : least,
       closed = this.shut(camera);
-    const key = `${ink.toFixed(3)} ${closed.map(({ id }) => id).join()}`;
+    const scale = camera.scale / devicePixelRatio,
+      isPlain = ink === 1 && !this.larger(scale);
+    const key = `${isPlain ? '' : scale.toFixed(3)} ${closed.map(({ id }) => id).join()}`;
     if (this.made && key === this.key) return this.made;
-    this.key = key;
-    this.ink = ink;
+    Object.assign(this, { key, ink, scale, isPlain });
     this.closed = closed;
     this.around.clear();
     for (const { id, data, shapes } of closed.length ? scene.groups : []) {
@@ -114,7 +122,7 @@ export class Zoom {
     const { bundles } = scene,
       { fineness, headMore } = scene.constants;
     this.made =
-      ink === 1 && !closed.length
+      isPlain && !closed.length
         ? scene
         : {
             ...scene,
@@ -138,10 +146,26 @@ export class Zoom {
     );
   }
 
-  /** A group as it is drawn from here: near by with less ink, thinner lines and smaller labels. @param {Group} group
-   * @returns {Group} */
+  /** Whether labels would be larger than they are to be, at so many pixels of a page for a unit. @param {number} scale
+   * @returns {boolean} */
+  larger(scale) {
+    const groups = this.scene?.groups ?? [];
+    return groups.some(({ shapes }) =>
+      shapes.some((shape) => shape.kind === 'text' && this.share(shape, scale) < 0.999),
+    );
+  }
+
+  /** How large a label is beside one that grows with what it is of. @param {Shape} shape @param {number} scale pixels of a
+   * page for a unit @returns {number} */
+  share({ font, onDisc }, scale) {
+    const most = Math.max(font * (this.scene?.density ?? 1), onDisc ? ON_DISC : BESIDE);
+    return Math.min(1, most / (font * scale));
+  }
+
+  /** A group as it is drawn from here: near by with thinner lines, and labels that are no larger than can well be read.
+   * @param {Group} group @returns {Group} */
   inked(group) {
-    const { ink } = this,
+    const { ink, scale } = this,
       { id, data, shapes } = group,
       [first] = shapes;
     if (id.startsWith('bundle:')) {
@@ -149,7 +173,8 @@ export class Zoom {
       const bands = shapes.flatMap((_, at) => (at % 2 ? [] : [shapes.slice(at, at + 2)]));
       return { ...group, shapes: bands.flatMap((band) => this.inked({ ...group, id: '', shapes: band }).shapes) };
     }
-    if (ink === 1 || !(Object.keys(data).length || /^(box|instance|title):/.test(id))) return group;
+    const isDrawn = Object.keys(data).length || /^(box|instance|title):/.test(id) || first?.kind === 'text';
+    if (this.isPlain || !isDrawn) return group;
     const { notch } = /** @type {Scene} */ (this.scene).constants,
       [head, tail] = shapes.filter(({ kind }) => kind === 'head');
     /** @type {{from: number[], to: number[]} | null} the first line of a label beside a disc: others stay below it */
@@ -177,14 +202,15 @@ export class Zoom {
           }
         }
         if (shape.kind === 'text') {
-          made.font = shape.font * ink;
+          const by = this.share(shape, scale);
+          made.font = shape.font * by;
           if (first.kind === 'disc') {
             // a label on a disc stays on it, and one beside it as close
             const [dx, dy] = [0, 1].map((axis) => shape.at[axis] - first.at[axis]),
               far = Math.hypot(dx, dy);
-            const share = far > first.radius ? ink + ((1 - ink) * first.radius) / far : ink;
+            const share = far > first.radius ? by + ((1 - by) * first.radius) / far : by;
             const { from, to } = line ?? { from: shape.at, to: [first.at[0] + share * dx, first.at[1] + share * dy] };
-            made.at = [0, 1].map((axis) => to[axis] + ink * (shape.at[axis] - from[axis]));
+            made.at = [0, 1].map((axis) => to[axis] + by * (shape.at[axis] - from[axis]));
             if (far > first.radius) line = { from, to };
           }
         }
