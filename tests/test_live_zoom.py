@@ -16,7 +16,7 @@ from test_live_drawing import opened as drawn_alone
 from test_live_looking import TIP, places, told
 
 from neurovis_spec.live.view import LEVELS, view_of
-from neurovis_spec.scene import Spline
+from neurovis_spec.scene import Spline, Text
 from neurovis_spec.scene.encode import looks
 
 pytestmark = pytest.mark.browser
@@ -181,5 +181,78 @@ def test_the_ring_around_what_is_held_keeps_its_weight_near_by(tmp_path: Path) -
             await opened.point(5, 5)
             assert 1 <= before <= 5
             assert 1 <= await ring(x, y) <= 5
+
+    asyncio.run(main())
+
+
+BOXES = """
+neurovis: 1
+name: boxes
+time: {dt: 0.05, steps: 100}
+neurons:
+  A: {count: 4, activation: tanh, bias: 1, box: one}
+  B: {count: 5, activation: tanh, box: two}
+  C: {activation: tanh}
+connections:
+  A -> B: {pattern: all_to_all, weight: 0.5, plasticity: {hebbian: {rate: 0.01}}}
+  B -> C: {pattern: all_to_all, weight: -1}
+layout: {engine: layered, direction: right}
+"""
+
+
+def test_a_click_on_a_title_closes_a_box_and_what_runs_to_it_is_added_up(tmp_path: Path) -> None:
+    (tmp_path / "boxes.yaml").write_text(BOXES)
+
+    async def main() -> None:
+        async with shown(str(tmp_path / "boxes.yaml"), tmp_path) as (opened, compiled, _):
+            await opened.until("Number(document.querySelector('#told').textContent.split(' ')[1]) > 9")
+            step = await pause(opened)
+            seen, at = view_of(compiled, compiled.gains), places(compiled)
+            middles = {}
+            for box in ("one", "two"):
+                (title,) = (group.shapes[0] for group in seen.plan.front if group.id == f"title:{box}")
+                assert isinstance(title, Text)
+                left, across = title.point[0], {"start": 8, "middle": 0, "end": -8}[title.anchor]
+                x, y = (seen.plan.frame.density * value for value in (left + across, title.point[1] - 3))
+                names = [compiled.network.neurons.names[index] for index in seen.plan.boxes[f"box:{box}"]]
+                middles[box] = np.mean([at[name] for name in names], axis=0)
+                await opened.click(x, y)
+                await opened.point(*middles[box])
+                await opened.until(f"/^{box}\\nmean .* %\\nneurons {len(names)}/.test({TIP}.textContent)")
+            (await picture(opened)).save(tmp_path / "closed.png")
+            # what runs between both is one band, of which the sum of this step is told
+            (x0, y0), (x1, y1) = middles["one"], middles["two"]
+            total = compiled.run(step + 1).snapshot(step).weights[:20].sum()
+            assert total > 10.001, "it has learned"
+            for aside in range(-30, 31, 3):
+                await opened.point((x0 + x1) / 2 - aside * (y1 - y0) / 100, (y0 + y1) / 2 + aside * (x1 - x0) / 100)
+                if str(await opened.ask(f"{TIP}.hidden ? '' : {TIP}.textContent")).startswith("one → two"):
+                    break
+            said = str(await opened.ask(f"{TIP}.textContent")).split("\n")[0]
+            assert said.startswith("one → two · 20 connections, sum ")
+            assert float(said.split("sum ")[1]) == pytest.approx(total, rel=1e-3)
+            # a click opens it again; held in the outline, Enter closes it and opens it
+            await opened.click(*middles["one"])
+            await opened.point(2, 2)
+            await opened.point(*at["A1"])
+            await told(opened, "A1")
+            await opened.key("o")
+            await opened.ask("Object.assign(document.querySelector('#search'), {value: 'two'}).oninput()")
+            await opened.until("document.querySelectorAll('#found li').length > 0")
+            await opened.key("Enter")
+            await opened.ask("document.querySelector('#search').value = ''")
+            await opened.key("Escape")
+            await opened.until("document.querySelector('#picture').matches(':focus')")
+            await opened.key("0")
+            await picture(opened)
+            closed = []
+            for _ in range(2):
+                await opened.key("Enter")
+                await picture(opened)
+                await opened.point(2, 2)
+                await opened.point(*at["B3"])
+                await opened.until(f"/^(B3|two)/.test({TIP}.textContent)")
+                closed.append(str(await opened.ask(f"{TIP}.textContent")).startswith("two"))
+            assert closed[0] != closed[1]
 
     asyncio.run(main())

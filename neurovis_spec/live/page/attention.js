@@ -151,15 +151,20 @@ export class Attention {
     this.changed();
   }
 
+  /** What is drawn is other than before: find what stands out. */
+  renew() {
+    if (this.held) this.near = new Set(this.around(this.held));
+    this.changed();
+  }
+
   /** All connections of what is held are told. @param {Told} told @returns {boolean} whether it still is */
   tell(told) {
     if (told.of !== this.coming) return false;
     for (const group of told.groups) this.groups.set(group.id, group);
     this.all = told;
     if (told.of === this.held) {
-      this.near = new Set(this.around(this.held));
+      this.renew();
       this.speak();
-      this.changed();
     } else if (this.groups.has(told.of) || this.others.has(told.of)) {
       this.keep(told.of);
     }
@@ -194,7 +199,12 @@ export class Attention {
     const discs = all.filter(
       ({ data }) => data.neuron !== undefined && (ends.has(data.neuron) || own.has(data.neuron)),
     );
-    return [id, ...[...lines, ...dotted, ...discs].map((group) => (group ? group.id : ''))];
+    // what runs from and to closed boxes
+    const boxes = new Set([id, ...[...own].flatMap((name) => this.zoom.around.get(name)?.id ?? [])]);
+    const joined = (this.zoom.joined?.ends ?? []).flatMap((pair, at) =>
+      pair.some((end) => boxes.has(end)) ? [`joined:${at}`] : [],
+    );
+    return [id, ...joined, ...[...lines, ...dotted, ...discs].map((group) => (group ? group.id : ''))];
   }
 
   /** @param {{values: Object<string, number | null>}} message */
@@ -242,7 +252,7 @@ export class Attention {
   /** The same without its connections. @param {string} id @param {Look} look @returns {string} */
   itself(id, look) {
     const group = this.groups.get(id) ?? this.unseen(id);
-    const bundle = id.startsWith('bundle:') && this.others.get(id);
+    const bundle = /^(bundle|joined):/.test(id) && (this.others.get(id) ?? this.zoom.joins(id));
     if (bundle) return this.bands?.words(bundle, look) ?? '';
     if (!group) return this.zoom.words(id, look);
     const [name, ...more] = group.title.split('\n'),

@@ -5,6 +5,7 @@
 
 import { channels } from './colours.js';
 import { packed } from './coverage.js';
+import { NARROWEST, WIDEST } from './joined.js';
 
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Look} Look */
@@ -49,19 +50,23 @@ export class Bands {
     this.bundles = bundles;
     this.constants = constants;
     this.inks = bundles.inks.map((of) => of.map((colour) => packed(channels(colour))));
+    /** of which sums of closed boxes the largest is known, and that @type {Float32Array[]} */
+    this.added = [];
+    this.most = 0;
     this.number = new Map(bundles.joined.map((id, number) => [id, number]));
   }
 
   /** What a bundle is drawn of: each band with its line and its head. A band that is not there at first stands beside that
    * which is. @param {Group} group @returns {{band: Band, shapes: Shape[]}[]} */
   of({ id, data, shapes }) {
-    const single = this.bundles.lone[id] ?? -1;
+    const single = this.bundles.lone[id] ?? -1,
+      isWhole = single >= 0 || id.startsWith('joined:');
     const found = ENDS.filter((_, at) => data[DOES[at]] !== undefined).map((end, at) => ({
       band: { bundle: id, end, single, thin: shapes[0].width },
       shapes: shapes.slice(2 * at, 2 * at + 2),
     }));
     for (const end of [1, -1]) {
-      if (single >= 0 || found.some(({ band }) => band.end === end)) continue;
+      if (isWhole || found.some(({ band }) => band.end === end)) continue;
       const [{ shapes: first }] = found,
         by = first[0].width / 2 + BESIDE + this.bundles.narrowest / 2;
       const points = beside(first[0].points, by),
@@ -79,14 +84,33 @@ export class Bands {
 
   /** What is told of a bundle. @param {string} id @param {Look} look @returns {Float32Array | null} */
   told(id, look) {
+    const joined = id.startsWith('joined:') ? NUMBERS * Number(id.slice(7)) : -1;
+    if (joined >= 0) return look.added.subarray(joined, joined + NUMBERS);
     const number = this.number.get(id) ?? -1;
     return number < 0 ? null : look.sums.subarray(NUMBERS * number, NUMBERS * (number + 1));
+  }
+
+  /** The largest sum of what runs from and to closed boxes. @param {Look} look @returns {number} */
+  mostOf({ added }) {
+    if (added !== this.added[0]) {
+      let most = 0;
+      added.forEach((sum, at) => {
+        if (at % NUMBERS < 3 && Math.abs(sum) > most) most = Math.abs(sum);
+      });
+      this.most = most;
+      if (most) this.added = [added];
+    }
+    return this.most;
   }
 
   /** How a band looks. @param {Band} band @param {Look} look @returns {Seen} */
   seen({ bundle, end, single, thin }, look) {
     const { isFaint, isBar, isNegative, faint, fineness } = this.constants,
-      { widest, narrowest, most, signs } = this.bundles;
+      { signs } = this.bundles,
+      isJoined = bundle.startsWith('joined:');
+    const { widest, narrowest, most } = isJoined
+      ? { widest: WIDEST * thin, narrowest: NARROWEST * thin, most: this.mostOf(look) }
+      : this.bundles;
     if (single >= 0) {
       const kind = look.kinds[single],
         now = kind & isNegative ? -1 : kind & isBar ? 0 : 1;

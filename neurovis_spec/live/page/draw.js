@@ -129,7 +129,7 @@ export class Drawing {
     } else if (data.connection !== undefined) {
       this.isBegun = true;
       this.lines.push({ id, index: Number(id.slice(1)), ...parts(shapes), band: null, laid: null });
-    } else if (id.startsWith('bundle:')) {
+    } else if (/^(bundle|joined):/.test(id)) {
       for (const { band, shapes: own } of this.bands.of(group)) {
         const { single } = band;
         this.lines.push({ id: single < 0 ? id : `c${single}`, index: single, ...parts(own), band, laid: null });

@@ -24,7 +24,7 @@ export function followKeys(keys) {
       { key } = event;
     if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
     if (at.matches('input[type=range]') ? SLIDES.test(key) : at.closest('input, select, textarea')) return;
-    if (key === ' ' && at.closest('button, summary')) return;
+    if ((key === ' ' || key === 'Enter') && at.closest('button, summary, a')) return;
     if (at.closest('dialog') && key !== '?') return;
     const known = keys[event.shiftKey && key.startsWith('Arrow') ? `shift+${CALLED[key]}` : key];
     if (known) {
@@ -64,7 +64,7 @@ const GROUPS = [
       ['click beside', 'let go'],
     ],
   ],
-  ['views', ['m', 'g', 'y', 'i', 'f'], []],
+  ['views', ['m', 'g', 'y', 'i', 'Enter', 'f'], []],
   [
     'changing',
     ['t', 'shift+←', 'shift+→', 'shift+↑', 'shift+↓', 'z', 'ctrl+z', 'ctrl+shift+z'],

@@ -52,6 +52,8 @@ let drawing = null;
 let marks = null;
 /** what is shown in place of the drawing, where it is @type {Matrix | null} */
 let matrix = null;
+/** of which closed boxes it was asked what runs from and to them */
+let joining = '';
 let fresh = false,
   asked = false,
   // whether a first scene may still be one in another theme than was asked for
@@ -66,6 +68,14 @@ function redraw() {
   }
 }
 
+/** Ask what runs from and to the boxes that are closed now. */
+function asks() {
+  const ids = zoom.ids.join();
+  if (ids === joining) return;
+  joining = ids;
+  link.ask('close', { boxes: zoom.ids });
+}
+
 /** Draw, and say so. */
 function show() {
   asked = false;
@@ -76,6 +86,7 @@ function show() {
   if (!matrix) {
     const scene = zoom.seen(camera);
     if (!scene) return;
+    if (!camera.way) asks();
     if (!drawing || (drawing.scene !== scene && !drawing.isPassing(camera))) {
       drawing = new Drawing(scene);
       marks = new Marks(scene);
@@ -141,6 +152,7 @@ const link = new Link({
     zoom.use(network);
     legend.use(scene);
     room.use(network, stays !== undefined);
+    joining = '';
     drawing = null;
     document.title = `${scene.title} – NeuroVis`;
     const names = { back: 'background', ink: 'ink', muted: 'muted', line: 'box_line', fill: 'box_fill' };
@@ -174,6 +186,10 @@ const link = new Link({
   },
   raster(raster) {
     strips.raster(raster);
+  },
+  joined(joined) {
+    zoom.join(joined);
+    attention.renew();
   },
   held(told) {
     if (!attention.tell(told)) return;
@@ -283,6 +299,14 @@ function go(id) {
   redraw();
 }
 
+/** Close a box, or open it, for which it may have to be gone to. @param {string} id */
+function turn(id) {
+  const isClosed = zoom.ids.includes(id);
+  if (!zoom.turn(id, camera) && isClosed) enter(id);
+  zoom.seen(camera); // so that the pointer knows at once
+  redraw();
+}
+
 /** Go to a box, so that it opens. @param {string} id */
 function enter(id) {
   const box = zoom.boxes.find((one) => one.id === id);
@@ -317,11 +341,14 @@ const placing = new Placing(
 const pointer = new Pointer(canvas, camera, attention, placing, {
   pointed(x, y) {
     if (matrix) return matrix.under(camera, x, y);
-    return zoom.under(camera.unit(x, y)) || (drawing ? under(drawing, camera, x, y) : '');
+    const at = camera.unit(x, y);
+    return (
+      zoom.under(at) || (drawing ? under(drawing, camera, x, y) || zoom.titled(at, context, drawing.family.join()) : '')
+    );
   },
   pressed(id) {
-    if (zoom.boxes.some((box) => box.id === id)) enter(id);
-    else attention.hold(id);
+    if (zoom.boxes.some((box) => box.id === id)) turn(id);
+    else if (!id.startsWith('joined:')) attention.hold(id);
   },
   redraw,
 });
@@ -403,6 +430,12 @@ Object.assign(controls.keys, {
     () => {
       pointer.cancel();
       attention.hold('');
+    },
+  ],
+  Enter: [
+    'close the box that is held, or open it',
+    () => {
+      if (zoom.boxes.some(({ id }) => id === attention.held)) turn(attention.held);
     },
   ],
   ']': ['hold the next neuron', () => attention.next(1)],

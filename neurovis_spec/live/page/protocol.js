@@ -37,11 +37,13 @@ import { isStill } from './camera.js';
  * excites, inhibits and does neither, added up and single.
  * @typedef {{joined: string[], lone: Object<string, number>, inks: string[][], widest: number, narrowest: number, most: number,
  *   signs: boolean}} Bundles */
+/** The boxes that are closed, and the ends of what runs from and to these, boxes or neurons by their ids.
+ * @typedef {{boxes: string[], ends: string[][]}} Joined */
 /** The spikes of some neurons, a row each: in cells (rows × bins) the share that fires, in 254ths, 255 where nothing is known; the
  * names of the first and the last.
  * @typedef {{id: string, first: number, every: number, bins: number, rows: number, ends: string[], cells: Uint8Array}} Raster */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
- *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array, pose: Float32Array, sums: Float32Array}} Look */
+ *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array, pose: Float32Array, sums: Float32Array, added: Float32Array}} Look */
 /** How the pose of a body is drawn: links are two points and a radius in metres, solids the lowest and the highest corner.
  * @typedef {{points: string[], links: number[][], feet: number[], middle: number,
  *   solids: [number[], number[]][]}} Skeleton */
@@ -65,7 +67,7 @@ import { isStill } from './camera.js';
  *   | {type: 'refused', reason: string}} Message */
 /** @typedef {{scene: (scene: Scene) => void, frame: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
  *   left: (traces: Traces) => void, pairs: (traces: Traces) => void,
- *   raster: (raster: Raster) => void, held: (told: Told) => void,
+ *   raster: (raster: Raster) => void, held: (told: Told) => void, joined: (joined: Joined) => void,
  *   text: (message: Message) => void, link: (open: boolean) => void}} Listener */
 
 /** Where little is to move, frames are taken over so many milliseconds after each other: fewer than three flashes a second. */
@@ -80,6 +82,8 @@ const SCENE = 1,
   KIND = 28,
   SUMS = 8,
   PAIRS = 11,
+  JOINED = 9,
+  ADDED = 10,
   HEAD = 40;
 
 /** Unpack what is compressed behind a head. @param {ArrayBuffer} buffer */
@@ -285,6 +289,7 @@ export class Link {
         glows: new Uint16Array(lines),
         kinds: new Uint8Array(lines + discs),
         pose: new Float32Array(0),
+        added: new Float32Array(0),
         sums: new Float32Array(NUMBERS * this.scene.bundles.joined.length),
       };
       this.listener.scene(this.scene);
@@ -308,6 +313,22 @@ export class Link {
       new DataView(data).getUint16(2, true) === this.scene.version
     ) {
       takeSums(data, this.look.sums);
+    } else if (
+      kind === JOINED &&
+      this.scene &&
+      this.look &&
+      new DataView(data).getUint16(2, true) === this.scene.version
+    ) {
+      const joined = await unzip(data);
+      this.look.added = new Float32Array(NUMBERS * joined.ends.length);
+      this.listener.joined(joined);
+    } else if (
+      kind === ADDED &&
+      this.scene &&
+      this.look &&
+      new DataView(data).getUint16(2, true) === this.scene.version
+    ) {
+      takeSums(data, this.look.added);
     } else if (kind === HELD && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.held(await unzip(data));
     }

@@ -1,31 +1,48 @@
 /**
  * Semantic zoom: lines and labels are no thicker and larger near by than in the picture, and at a distance boxes and
- * instances are closed: they have the mean colour of their neurons, and their name.
+ * instances are closed: they have the mean colour of their neurons, their name, and a raster of the last frames; what runs
+ * from and to them is added up. Each can be closed by hand, too.
  */
+
+import { groupsOf } from './joined.js';
+import { Past } from './raster.js';
 
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./protocol.js').Shape} Shape */
-/** @typedef {{id: string, path: string, rect: number[], members: number[], radius: number, holds: boolean}} Box */
+/** @typedef {import('./protocol.js').Joined} Joined */
+/** Of its neurons the least radius, and the least size of a label, 0 where none has one.
+ * @typedef {{id: string, path: string, rect: number[], members: number[], radius: number, font: number, holds: boolean,
+ *   title: Shape | null}} Box */
 
-/** A box is closed where its discs have a smaller radius than this, in pixels of a page, unless the picture is shown
- * almost in its own size, or it holds others and is so large. */
-const TINY = 3,
+/** A box is closed where its labels are smaller than this, or, without labels, its discs, in pixels of a page, unless the
+ * picture is shown almost in its own size, or it holds others and is so large, or all neurons. */
+const LEGIBLE = 7,
+  TINY = 3,
   OWN = 0.75,
   ROOMY = 150;
-/** The size of a closed box's name, in pixels of a page. */
-const NAMED = 12;
 /** How large labels grow with what they are of, those on discs and others, in pixels of a page; those are larger alone
  * that are so in the picture. */
 const ON_DISC = 28,
   BESIDE = 16;
+/** The size of a closed box's name, in pixels of a page, and the least. */
+const NAMED = 12,
+  SMALL = 7;
+/** How high its raster is at least, in pixels of a page, and half of how wide. */
+const RASTER = 14;
 /** The level of a neuron whose activity is no finite number. */
 const NONE = -128;
 
 /** Whether a point lies in a rectangle. @param {number[]} rect @param {number[]} at @returns {boolean} */
 const within = ([x0, y0, x1, y1], [x, y]) => x >= x0 && x <= x1 && y >= y0 && y <= y1;
+
+/** The rectangle around points. @param {number[]} points @returns {number[]} */
+function edges(points) {
+  const [xs, ys] = [0, 1].map((axis) => points.filter((_, at) => at % 2 === axis));
+  return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
+}
 
 /** What of a scene is drawn at a distance. */
 export class Zoom {
@@ -34,6 +51,11 @@ export class Zoom {
     this.scene = this.whole = null;
     /** @type {Box[]} */
     this.boxes = [];
+    /** the ids of those that are closed by hand @type {Set<string>} */
+    this.hand = new Set();
+    /** what runs from and to closed boxes, and what it adds up to, as it is told @type {Joined | null} */
+    this.joined = null;
+    this.past = new Past();
     /** the boxes that are closed now @type {Box[]} */
     this.closed = [];
     /** the box that is closed around a neuron, by its name @type {Map<string, Box>} */
@@ -42,6 +64,8 @@ export class Zoom {
     this.made = null;
     /** what it was made for, and from where it was last seen */
     this.key = this.from = '';
+    /** all groups by their ids @type {Map<string, Group>} */
+    this.places = new Map();
     /** how thick lines are beside the picture's, pixels of a page for a unit, and whether all is as in the picture */
     this.ink = 1;
     this.scale = 1;
@@ -50,18 +74,33 @@ export class Zoom {
 
   /** Another network. @param {Scene} scene */
   use(scene) {
-    const discs = scene.groups.filter(({ data }) => data.neuron !== undefined);
+    this.places = new Map(scene.groups.map((group) => [group.id, group]));
     this.boxes = scene.groups
-      .filter(({ id }) => /^(box|instance):/.test(id))
-      .map(({ id, title, shapes: [{ at, size }] }) => {
-        const rect = [...at, at[0] + size[0], at[1] + size[1]],
-          inside = discs.filter(({ shapes }) => within(rect, shapes[0].at));
-        const members = inside.map((disc) => Number(disc.id.slice(1)));
-        const radius = Math.min(...inside.map(({ shapes }) => shapes[0].radius));
-        return { id, path: title, rect, members, radius, holds: false };
-      })
-      .filter(({ members }) => members.length);
-    for (const box of this.boxes) box.holds = this.boxes.some((other) => other !== box && within(box.rect, other.rect));
+      .filter(({ id }) => scene.boxes[id]?.length)
+      .map(({ id, title, shapes: [{ at, size, points }] }) => {
+        const members = scene.boxes[id],
+          inside = members.map((index) => /** @type {Group} */ (this.places.get(`n${index}`)).shapes);
+        const radius = Math.min(...inside.map(([disc]) => disc.radius)),
+          fonts = inside.flat().flatMap(({ kind, font }) => (kind === 'text' ? [font] : []));
+        const rect = points ? edges(points) : [...at, at[0] + size[0], at[1] + size[1]];
+        const words = this.places.get(`title:${title}`)?.shapes[0] ?? null;
+        return {
+          id,
+          path: title,
+          rect,
+          members,
+          radius,
+          font: Math.min(...fonts, 99) % 99,
+          holds: false,
+          title: words,
+        };
+      });
+    const inside = (/** @type {Box} */ box, /** @type {Box} */ other) =>
+      other !== box && other.members.every((index) => box.members.includes(index));
+    for (const box of this.boxes) box.holds = this.boxes.some((other) => inside(box, other));
+    this.hand = new Set([...this.hand].filter((id) => id in scene.boxes));
+    this.joined = null;
+    this.past.clear();
     this.scene = this.whole = scene;
     this.made = null;
   }
@@ -79,24 +118,45 @@ export class Zoom {
     this.made = null;
   }
 
+  /** Close a box by hand, or open it again; whether it is open then. @param {string} id @param {Camera} camera
+   * @returns {boolean} */
+  turn(id, camera) {
+    const isOpen = !this.ids.includes(id);
+    this.hand.delete(id);
+    if (isOpen) this.hand.add(id);
+    this.from = '';
+    return !isOpen && !this.shut(camera).some((box) => box.id === id);
+  }
+
+  /** What runs from and to closed boxes is told. @param {Joined} joined */
+  join(joined) {
+    this.joined = joined;
+    this.made = null;
+  }
+
   /** The boxes that are closed, the outermost of those in each other. @param {Camera} camera @returns {Box[]} */
   shut(camera) {
     const scale = camera.scale / devicePixelRatio,
       density = this.scene ? this.scene.density : 1;
     /** @type {Box[]} */
-    const closed = [];
-    for (const box of scale < OWN * density ? this.boxes : []) {
+    const closed = [],
+      isFar = scale < OWN * density,
+      all = this.scene?.discs;
+    for (const box of this.boxes) {
       const [x0, y0, x1, y1] = box.rect,
         roomy = box.holds && Math.min(x1 - x0, y1 - y0) * scale >= ROOMY;
-      const covered = closed.some(({ rect }) => within(rect, [x0, y0]) && within(rect, [x1, y1]));
-      if (!covered && !roomy && box.radius * scale < TINY) closed.push(box);
+      const covered = closed.some(({ members }) => box.members.every((index) => members.includes(index))),
+        isTiny = box.font ? box.font * scale < LEGIBLE : box.radius * scale < TINY;
+      if (!covered && (this.hand.has(box.id) || (isFar && isTiny && !roomy && box.members.length !== all)))
+        closed.push(box);
     }
     return closed;
   }
 
   /** The least pixels for a unit at which a box is open. @param {Box} box @returns {number} */
-  opening({ radius }) {
-    return this.scene ? devicePixelRatio * Math.min(OWN * this.scene.density, TINY / radius) : 0;
+  opening({ radius, font }) {
+    const legible = font ? LEGIBLE / font : TINY / radius;
+    return this.scene ? devicePixelRatio * Math.min(OWN * this.scene.density, legible) : 0;
   }
 
   /** The scene as it is seen from here; the same as long as it is drawn the same way. @param {Camera} camera @returns {Scene | null} */
@@ -115,9 +175,8 @@ export class Zoom {
     Object.assign(this, { key, ink, scale, isPlain });
     this.closed = closed;
     this.around.clear();
-    for (const { id, data, shapes } of closed.length ? scene.groups : []) {
-      const box = /^n\d+$/.test(id) && closed.find(({ rect }) => within(rect, shapes[0].at));
-      if (box) this.around.set(data.neuron, box);
+    for (const box of closed) {
+      for (const index of box.members) this.around.set(this.places.get(`n${index}`)?.data.neuron ?? '', box);
     }
     const { bundles } = scene,
       { fineness, headMore } = scene.constants;
@@ -128,16 +187,60 @@ export class Zoom {
             ...scene,
             bundles: { ...bundles, widest: bundles.widest * ink, narrowest: bundles.narrowest * ink },
             constants: { ...scene.constants, fineness: fineness / ink, headMore: headMore * ink },
-            groups: scene.groups.filter((group) => !this.covers(group)).map((group) => this.inked(group)),
+            groups: this.withJoined(
+              scene.groups.filter((group) => !this.covers(group)).map((group) => this.inked(group)),
+              camera,
+            ),
           };
     return this.made;
+  }
+
+  /** What runs from and to closed boxes, by its id. @param {string} id @returns {Group | undefined} */
+  joins(id) {
+    return this.made?.groups.find((group) => group.id === id);
+  }
+
+  /** The ids of the boxes that are closed. @returns {string[]} */
+  get ids() {
+    return this.closed.map(({ id }) => id);
+  }
+
+  /** Groups with what runs from and to closed boxes, beneath the discs. @param {Group[]} groups @param {Camera} camera
+   * @returns {Group[]} */
+  withJoined(groups, camera) {
+    const { joined, scene } = this,
+      page = devicePixelRatio / camera.scale;
+    if (!joined || !scene || joined.boxes.join() !== this.ids.join()) return groups;
+    const at = groups.findIndex(({ data }) => data.neuron !== undefined),
+      place = at < 0 ? groups.findIndex(({ id }) => id.startsWith('title:')) : at;
+    return [
+      ...groups.slice(0, place < 0 ? groups.length : place),
+      ...groupsOf(joined, (id) => this.place(id), page, scene),
+      ...(place < 0 ? [] : groups.slice(place)),
+    ];
+  }
+
+  /** Where a box or a neuron is, and how it is called. @param {string} id @returns {{rect: number[], name: string} | null} */
+  place(id) {
+    const box = this.boxes.find((one) => one.id === id),
+      disc = this.places.get(id)?.shapes[0];
+    if (box) return { rect: box.rect, name: box.path };
+    if (!disc) return null;
+    const [x, y] = disc.at;
+    const rect = [x - disc.radius, y - disc.radius, x + disc.radius, y + disc.radius];
+    return { rect, name: this.places.get(id)?.data.neuron ?? '' };
   }
 
   /** Whether closed boxes stand in for a group. @param {Group} group @returns {boolean} */
   covers({ id, data }) {
     if (data.neuron !== undefined) return this.around.has(data.neuron);
-    const [from, to] = data.signal === undefined ? [data.from, data.to] : data.signal.split(' -> ');
-    if (from !== undefined) return this.around.has(from) && this.around.get(from) === this.around.get(to);
+    if (!this.closed.length) return false;
+    if (data.connection !== undefined) return this.around.has(data.from) || this.around.has(data.to);
+    if (data.signal !== undefined) {
+      const [from, to] = data.signal.split(' -> ');
+      return this.around.has(from) && this.around.get(from) === this.around.get(to);
+    }
+    if (id.startsWith('bundle:')) return data.pathway.split(' -> ').some((group) => this.isIn(group));
     const [kind, ...path] = id.split(':'),
       known = ['box', 'instance', 'title'].includes(kind);
     const one = known && this.boxes.find((box) => (kind === 'title' ? box.path === path.join(':') : box.id === id));
@@ -160,6 +263,12 @@ export class Zoom {
   share({ font, onDisc }, scale) {
     const most = Math.max(font * (this.scene?.density ?? 1), onDisc ? ON_DISC : BESIDE);
     return Math.min(1, most / (font * scale));
+  }
+
+  /** Whether all neurons of a group are in closed boxes. @param {string} group @returns {boolean} */
+  isIn(group) {
+    const own = this.scene?.groups.filter(({ data }) => data.group === group) ?? [];
+    return own.length > 0 && own.every(({ data }) => this.around.has(data.neuron));
   }
 
   /** A group as it is drawn from here: near by with thinner lines, and labels that are no larger than can well be read.
@@ -246,17 +355,42 @@ export class Zoom {
     return box ? box.id : '';
   }
 
+  /** The open box whose title is under a unit, '' for none. @param {number[]} at @param {CanvasRenderingContext2D} context
+   * @param {string} family @returns {string} */
+  titled([x, y], context, family) {
+    const box = this.boxes.find(({ title, path }) => {
+      if (!title || [...this.closed].some((one) => one.path === path)) return false;
+      const font = title.font * this.ink;
+      context.font = `${title.weight} ${100}px ${family}`;
+      const wide = (context.measureText(title.text).width * font) / 100,
+        left = title.at[0] - wide * (title.anchor === 'middle' ? 0.5 : title.anchor === 'end' ? 1 : 0);
+      return x >= left && x <= left + wide && y >= title.at[1] - 1.1 * font && y <= title.at[1] + 0.4 * font;
+    });
+    return box && !this.closed.some(({ members }) => members.includes(box.members[0])) ? box.id : '';
+  }
+
+  /** Choose letters in which a text has room, smaller ones where it must be, 0 for none. @param {CanvasRenderingContext2D} context
+   * @param {string} text @param {number} room @param {number} weight @param {string} family @returns {number} */
+  fitted(context, text, room, weight, family) {
+    const page = devicePixelRatio;
+    context.font = `${weight} ${NAMED * page}px ${family}`;
+    const size = Math.min(NAMED, (NAMED * room) / Math.max(1, context.measureText(text).width));
+    context.font = `${weight} ${size * page}px ${family}`;
+    return size < SMALL ? 0 : size;
+  }
+
   /** Draw the closed boxes. @param {CanvasRenderingContext2D} context @param {Camera} camera @param {Look} look
-   * @param {{palette: {fills: string[], texts: string[]}, family: string[], near: Set<string>}} drawing */
+   * @param {{palette: {fills: string[], texts: string[], channels: number[][]}, family: string[], near: Set<string>}} drawing */
   draw(context, camera, look, { palette, family, near }) {
+    this.past.add(look);
     if (!this.scene || !this.closed.length) return;
     const { theme, constants } = this.scene,
       page = devicePixelRatio;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.textAlign = 'center';
     for (const box of this.closed) {
-      const [x0, y0] = camera.pixel(box.rect[0], box.rect[1]),
-        [x1, y1] = camera.pixel(box.rect[2], box.rect[3]);
+      const [x0, y0] = camera.pixel(box.rect[0], box.rect[1]);
+      let [x1, y1] = camera.pixel(box.rect[2], box.rect[3]);
       const level = this.mean(box, look) + constants.levels,
         middle = (x0 + x1) / 2;
       context.globalAlpha = !near.size || box.members.some((index) => near.has(`n${index}`)) ? 1 : 0.3;
@@ -271,12 +405,20 @@ export class Zoom {
       const [, mean] = this.words(box.id, look).split('\n'),
         room = x1 - x0 - 4 * page;
       const lines = [box.path.split('.').pop() || '', mean.slice(5)];
-      const fits = y1 - y0 > 2.6 * NAMED * page ? lines : lines.slice(0, 1);
+      const fits = y1 - y0 > 2.6 * NAMED * page ? lines : lines.slice(0, 1),
+        below = y1 - y0 - (fits.length * 1.25 + 1) * NAMED * page,
+        isRoomy = below >= RASTER * page && x1 - x0 >= 2 * RASTER * page && box.members.length > 1;
+      if (isRoomy) {
+        const edge = 5 * page,
+          high = Math.min(below, 4 * RASTER * page, 4 * box.members.length * page);
+        const where = [x0 + edge, y1 - edge - high, x1 - x0 - 2 * edge, high];
+        this.past.draw(context, box.members, where, palette.channels, constants.levels);
+        y1 -= high + edge;
+      }
       fits.forEach((text, at) => {
-        context.font = `${at ? 400 : 600} ${NAMED * page}px ${family}`;
-        const down = (at - (fits.length - 1) / 2) * 1.25 + 0.36;
-        if (context.measureText(text).width <= room)
-          context.fillText(text, middle, (y0 + y1) / 2 + down * NAMED * page);
+        const down = (at - (fits.length - 1) / 2) * 1.25 + 0.36,
+          size = this.fitted(context, text, room, at ? 400 : 600, family.join());
+        if (size) context.fillText(text, middle, (y0 + y1) / 2 + down * NAMED * page);
       });
     }
     context.textAlign = 'start';
