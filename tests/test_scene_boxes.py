@@ -12,7 +12,7 @@ from scenes import scene_of
 import neurovis_spec as nv
 from neurovis_spec.layout.geometry import meet, sampled
 from neurovis_spec.layout.model import RADIUS, Point
-from neurovis_spec.scene import Disc, Spline, Text
+from neurovis_spec.scene import Disc, Polygon, Spline, Text
 from neurovis_spec.scene.boxes import Box, Sector, boxes_of, sector
 from neurovis_spec.text_width import width
 
@@ -113,12 +113,14 @@ def test_neurons_that_do_not_follow_each_other_on_a_ring_have_no_sector() -> Non
     assert sector(ring * (1.0, 1.1), everybody, np.array([0, 1])) is None
 
 
-def test_sectors_are_drawn_as_lines_around_their_neurons() -> None:
+def test_sectors_are_filled_lines_around_their_neurons() -> None:
     network = nv.compile_text(RING.replace("ENGINE", "circular"))
     scene = scene_of(network, network.run(1).snapshot(0))
     groups = {group.id: group for group in scene.groups}
+    fills = set()
     for name in ("one", "two", "three"):
-        (shape,) = groups[f"box:{name}"].shapes
+        *filled, shape = groups[f"box:{name}"].shapes
+        fills |= {piece.fill for piece in filled if isinstance(piece, Polygon)}
         assert isinstance(shape, Spline)
         assert shape.points[0] == shape.points[-1]
         (title,) = groups[f"title:{name}"].shapes
@@ -126,6 +128,7 @@ def test_sectors_are_drawn_as_lines_around_their_neurons() -> None:
         (x, y), size = title.point, title.size
         where = np.array(sampled(shape.points, 1.0)) - (x, y)
         assert np.hypot(*where.T).min() < 8 * size
+    assert len(fills) == 3
 
 
 def test_boxes_on_a_ring_are_sectors_where_rectangles_would_have_room_too() -> None:

@@ -37,6 +37,8 @@ HALF, _SHARE = RADIUS + 0.25, 0.42
 _FEWEST_ON_RING, _ON_RING = 5, 0.02
 #: A cubic piece of an arc turns by this at most.
 _PIECE = math.pi / 4
+#: One of what fills a sector by this, and how far it goes on beneath the next.
+_FILLED, _OVER = math.pi / 45, math.pi / 180
 _GREEK = {"sigma": "σ", "beta": "β", "alpha": "α", "gamma": "γ", "theta": "θ", "tau": "τ"}
 
 
@@ -49,9 +51,25 @@ class Sector:
     first: float
     last: float
 
+    @property
+    def reach(self) -> tuple[float, float]:
+        """How far from the centre it begins and ends."""
+        return max(self.radius - HALF, 0.0), self.radius + HALF
+
+    def pieces(self) -> FloatArray:
+        """(k, 4, 2) corners of convex pieces that fill it, each a little over the next, so that no seam is seen."""
+        count = math.ceil((self.last - self.first) / _FILLED)
+        turn = self.first + (self.last - self.first) * np.arange(count + 1) / count
+        ends = np.minimum(turn[1:] + _OVER, self.last)
+        corners = zip(turn[:-1].tolist(), ends.tolist(), strict=True)
+        inner, outer = self.reach
+        return np.array(
+            [[self._at(a, inner), self._at(a, outer), self._at(b, outer), self._at(b, inner)] for a, b in corners]
+        )
+
     def outline(self) -> Route:
         """The spline along its border, back to where it begins."""
-        outer, inner = self._arc(self.radius + HALF), self._arc(max(self.radius - HALF, 0.0))[::-1]
+        inner, outer = self._arc(self.reach[0])[::-1], self._arc(self.reach[1])
         return (*outer, *straight(outer[-1], inner[0])[1:], *inner[1:], *straight(inner[-1], outer[0])[1:])
 
     def _arc(self, radius: float) -> Route:

@@ -57,7 +57,7 @@ from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.line_labels import backed, line_labels, pathway_labels
 from neurovis_spec.scene.line_styles import Styles, styles_of
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
-from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Shape, Spline, Text, Theme, head_half_width
+from neurovis_spec.scene.model import Arrowhead, Group, Polygon, Rectangle, Shape, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.pathway_words import PathwayWords, lost_by
 from neurovis_spec.scene.pathways import Pathway, pathways
@@ -741,7 +741,9 @@ def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]
         shapes: tuple[Shape, ...] = (Rectangle((x0, y0), x1 - x0, y1 - y0, radius, fill, line, 1.0),)
         if box.sector is not None:
             line_around = tuple((x, y) for x, y in frame.map(np.array(box.sector.outline())).tolist())
-            shapes = (Spline(line_around, line, 1.0),)
+            pieces = frame.map(box.sector.pieces()).tolist()
+            filled = (Polygon(tuple((x, y) for x, y in corners), fill) for corners in pieces)
+            shapes = (*filled, Spline(line_around, line, 1.0))
         groups.append(Group(shapes, id=f"{box.kind}:{box.path}", title=box.path))
     return groups
 
