@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -53,18 +54,21 @@ def best_sides(problem: LayoutProblem, layout: Layout, freely: bool = False) -> 
     for _ in range(_ROUNDS):
         settled = dict(chosen)
         for mates in classes:
-            best: tuple[tuple[int, ...], dict[int, Side]] | None = None
-            for rank, sides in enumerate(_candidates(mates, given, problem.direction)):
-                blocked, lines = trial.cost(sides, chosen)
-                cost = blocked, lines, _apart(sides, chosen, beside), rank
-                if (freely or not blocked) and (best is None or cost < best[0]):
-                    best = cost, sides
-            if best is not None:
-                chosen.update(best[1])
+            costs = [
+                ((*trial.cost(sides, chosen), _apart(sides, chosen, beside), rank), sides)
+                for rank, sides in enumerate(_candidates(mates, given, problem.direction))
+            ]
+            chosen.update(_least(costs, freely))
         if chosen == settled:
             break
     kept = {i: side for i, side in chosen.items() if freely or i in given or not trial.cost({i: side}, chosen)[0]}
     return {names[i]: side for i, side in sorted(kept.items())}
+
+
+def _least(costs: Sequence[tuple[tuple[int, ...], dict[int, Side]]], freely: bool) -> dict[int, Side]:
+    """The sides that cost least, of those that lie on nothing, or of all; none where there are none."""
+    free = [(cost, sides) for cost, sides in costs if freely or not cost[0]]
+    return min(free, key=itemgetter(0))[1] if free else {}
 
 
 def _apart(sides: Mapping[int, Side], chosen: Mapping[int, Side], beside: Mapping[int, frozenset[int]]) -> int:

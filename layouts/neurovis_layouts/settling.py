@@ -294,31 +294,42 @@ class _Settling:
             done.update(i for copy in singles for i in copy.members)
             return singles, before.where[neuron] if neuron in lost else lead
 
-        for known_before in (True, False):
-            for neuron in () if known_before else sorted(self._around, key=lambda i: (i not in firm, i)):
+        for known_before, around in ((True, []), (False, sorted(self._around, key=lambda i: (i not in firm, i)))):
+            for neuron in around:
                 if neuron not in done and not done.isdisjoint(self._around[neuron][-1].members):
                     yield single(neuron)
             for one in sorted(self._wholes, key=lambda one: self._alone(one.members[0], placed)):
                 if not done.isdisjoint(one.members) or (known_before and not lost.issuperset(one.members)):
                     continue
                 counterparts = list(self._copies(alike, one, axis))
-                back, lead = STAY, next((copy for copy in counterparts if done.issuperset(copy[0])), None)
-                if known_before:
-                    anchor: Point | None = before.where[one.members[0]]
-                    shape = self._shape(one, before.where, self._frames.rects(before.where, {}), held)
-                elif lead is not None:
-                    anchor, back = placed[lead[0][0]], lead[1].inverse()
-                    at = {m: placed[mate] for m, mate in zip(one.members, lead[0], strict=True)}
-                    rect = there.rect(self._numbers.get(frozenset(lead[0]), -1))
-                    shape = _Shape.of(at, rect or bounds(at.values()))
-                else:
-                    anchor, shape = None, self._shape(one, placed, there.rects, held)
-                copies = self._bodies(Body(shape.offsets, one.frame, shape.rect, back), counterparts, done)
+                lead = next((copy for copy in counterparts if done.issuperset(copy[0])), None)
+                anchor, first = self._first(one, before if known_before else lead, there, held)
+                copies = self._bodies(first, counterparts, done)
                 done.update(i for copy in copies for i in copy.members)
                 yield copies, anchor
             for neuron in range(len(problem.neurons)):
                 if neuron not in done and (neuron in lost or not known_before):
                     yield single(neuron)
+
+    def _first(
+        self,
+        one: Whole,
+        like: Earlier | tuple[tuple[int, ...], Move] | None,
+        there: Occupancy,
+        held: Mapping[int, Point],
+    ) -> tuple[Point | None, Body]:
+        """A whole as it was, as a counterpart is drawn that is placed, by the move that leads there, or as what is
+        placed of it asks for; and where it was, or the counterpart is."""
+        if like is None:
+            shape = self._shape(one, there.placed, there.rects, held)
+            return None, Body(shape.offsets, one.frame, shape.rect, STAY)
+        if isinstance(like, Earlier):
+            shape = self._shape(one, like.where, self._frames.rects(like.where, {}), held)
+            return like.where[one.members[0]], Body(shape.offsets, one.frame, shape.rect, STAY)
+        mates, move = like
+        at = {m: there.placed[mate] for m, mate in zip(one.members, mates, strict=True)}
+        shape = _Shape.of(at, there.rect(self._numbers.get(frozenset(mates), -1)) or bounds(at.values()))
+        return there.placed[mates[0]], Body(shape.offsets, one.frame, shape.rect, move.inverse())
 
     def _bodies(
         self, first: Body, counterparts: Sequence[tuple[tuple[int, ...], Move]], done: AbstractSet[int]

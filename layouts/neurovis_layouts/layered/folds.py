@@ -22,6 +22,7 @@ from itertools import pairwise
 import networkx as nx
 
 from neurovis_layouts.layered.levels import Levels, Segment
+from neurovis_layouts.layered.page_cost import page_across
 from neurovis_layouts.layered.parts import symmetric
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint
@@ -135,13 +136,15 @@ def _strands(
             if one in free and other not in free and rank[one] != rank[other]:
                 lines[one][rank[other] > rank[one]] += 1
     graph.add_edges_from((u, owner[pair[m]]) for u in sorted(free) for m in units[u].members if m in pair)
-    found: list[_Strand] = []
-    for part in nx.connected_components(graph):
+
+    def strand(part: AbstractSet[int]) -> _Strand:
         own = tuple(sorted(part, key=lambda u: min(units[u].members)))
         levels = [rank[u] for u in own]
         wide = max(math.fsum(sheet.wide(u) for u in own if rank[u] == level) for level in levels)
         up, down = (sum(lines[u][side] for u in own) for side in (0, 1))
-        found.append(_Strand(own, min(levels), max(levels), wide, (up, down)))
+        return _Strand(own, min(levels), max(levels), wide, (up, down))
+
+    found = map(strand, nx.connected_components(graph))
     return sorted(found, key=lambda strand: min(units[strand.units[0]].members))
 
 
@@ -164,7 +167,7 @@ class _Sheet:
     ) -> None:
         self._spacing, self._gap = max(problem.neuron_spacing, 0.65), max(problem.rank_spacing, 0.75)
         self._units = units
-        self._page = problem.page if problem.direction in ("down", "up") else 1 / problem.page
+        self._page = page_across(problem)
         count = max(rank, default=-1) + 1
         self._fixed, self._high = [0.0] * count, [0.0] * count
         for u, r in enumerate(rank):

@@ -62,6 +62,11 @@ def sides(rect: Rect, direction: Direction) -> tuple[float, float]:
     return (across, along) if direction in ("down", "up") else (along, across)
 
 
+def page_across(problem: LayoutProblem) -> float:
+    """How far the page reaches across the direction, of how far it reaches along it."""
+    return problem.page if problem.direction in ("down", "up") else 1 / problem.page
+
+
 def stretched(problem: LayoutProblem, wide: float, high: float) -> float:
     """How much wider or higher than a page something of this size is."""
     return max(wide / (problem.page * high), problem.page * high / wide)

@@ -24,6 +24,7 @@ import numpy.typing as npt
 from neurovis_layouts.isotonic import spread
 from neurovis_layouts.layered.box_columns import Strips
 from neurovis_layouts.layered.levels import Levels, Node, Segment
+from neurovis_layouts.layered.page_cost import page_across
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutProblem, Point
 
@@ -227,22 +228,26 @@ def staggered(
     """The levels with the widest ranks staggered; None where they are not much wider than a page."""
     xs, ys = zip(*places, strict=True)
     wide, high = max(xs) - min(xs) + 1, max(ys) - min(ys) + 1
-    page = problem.page if problem.direction in ("down", "up") else 1 / problem.page
-    if wide < _WIDE * page * high:
+    if wide < _WIDE * page_across(problem) * high:
         return None
     lined = {m for line in problem.align for m in line}
-    group = {m: number for number, own in enumerate(problem.groups) for m in own.members}
     nodes = list(levels.nodes)
     for rank in order:
         own = [n for n in rank if nodes[n].members]
         across = [places[n][0] for n in own]
         alone = all(_alone(nodes[n]) and not nodes[n].lift and nodes[n].members[0][0] not in lined for n in own)
         if alone and len(own) >= _FEWEST and max(across) - min(across) > _PART * wide:
-            layer = len({group.get(nodes[n].members[0][0]) for n in own}) == 1
-            rows = max(2, math.ceil(2 * _STAGGERED * len(own) / _LONGEST_ROW)) if layer else 2
+            rows = _rows_of(problem, [nodes[n].members[0][0] for n in own])
             for place, n in enumerate(own):
                 nodes[n] = replace(nodes[n], lift=snap(((rows - 1) / 2 - (place + 1) % rows) * problem.neuron_spacing))
     return None if nodes == levels.nodes else replace(levels, nodes=nodes)
+
+
+def _rows_of(problem: LayoutProblem, rank: Sequence[int]) -> int:
+    """In how many rows the neurons of a wide rank stand: two, those of a long layer in more."""
+    group = {m: number for number, own in enumerate(problem.groups) for m in own.members}
+    layer = len({group.get(m) for m in rank}) == 1
+    return max(2, math.ceil(2 * _STAGGERED * len(rank) / _LONGEST_ROW)) if layer else 2
 
 
 def flattened(problem: LayoutProblem, levels: Levels, places: Sequence[Point]) -> float:
