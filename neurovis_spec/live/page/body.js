@@ -3,6 +3,7 @@
  */
 
 import { channels } from './colours.js';
+import { Space } from './space.js';
 import { roundAbove, written } from './ticks.js';
 
 /** @typedef {import('./protocol.js').Look} Look */
@@ -22,7 +23,8 @@ const EDGE = 10,
   NUMBERS = 17,
   APART = 46,
   BAR = 50,
-  FONT = 11;
+  FONT = 11,
+  BUTTON = 48;
 /** The drawings leave so much room around the body, and so much more where it reaches further than before. */
 const ROOM = 1.12,
   WIDER = 1.3,
@@ -41,6 +43,9 @@ const FAR = 0.45,
 /** The way that the body took: how wide its line is, and how much of its colour is left. */
 const WAY = 2,
   PALE = 0.55;
+/** Ways of episodes before this one that are kept, and how much is left of their colour. */
+const WAYS = 12,
+  PALER = 0.25;
 /** A solid as high as the ground is the ground. */
 const FLAT = 1e-6;
 
@@ -91,12 +96,13 @@ function distance(one, other) {
 /** The panel of the body. */
 export class Body {
   /** @param {HTMLElement} panel @param {HTMLCanvasElement} canvas @param {HTMLButtonElement} button
-   * @param {() => void} redraw */
-  constructor(panel, canvas, button, redraw) {
+   * @param {HTMLButtonElement} spatial @param {() => void} redraw */
+  constructor(panel, canvas, button, spatial, redraw) {
     this.panel = panel;
     this.canvas = canvas;
     this.button = button;
     this.redraw = redraw;
+    this.space = new Space(canvas, spatial, redraw);
     /** @type {Skeleton | null} */
     this.skeleton = null;
     this.start = [0, 0];
@@ -106,6 +112,8 @@ export class Body {
     this.tops = [];
     /** where the middle was at the steps that were shown, up to the one that is @type {[number, number, number][]} */
     this.way = [];
+    /** the ways of episodes before, the last of them last @type {[number, number, number][][]} */
+    this.ways = [];
     this.open = true;
     /** what is drawn: nothing else needs to be */
     this.drawn = '';
@@ -122,7 +130,9 @@ export class Body {
     this.reach = { ahead: LEAST, aside: LEAST, low: 0, high: LEAST };
     this.tops = [];
     this.way = [];
+    this.ways = [];
     this.words = '';
+    this.space.forget();
     this.arrange();
   }
 
@@ -157,7 +167,7 @@ export class Body {
     this.follow(look);
     if (!skeleton || this.panel.hidden) return;
     const { clientWidth: wide, clientHeight: high } = canvas,
-      wanted = [look.step, look.serial, wide, high, devicePixelRatio, scene.version].join(' ');
+      wanted = [look.step, look.serial, wide, high, devicePixelRatio, scene.version, this.space.key].join(' ');
     if (!wide || !high || wanted === this.drawn) return;
     this.drawn = wanted;
     const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
@@ -179,6 +189,26 @@ export class Body {
     context.lineCap = context.lineJoin = 'round';
     if (points) this.measure(points);
     const touching = this.touching(look);
+    if (points && this.space.on) {
+      const room = { left: EDGE, top: TITLE, wide: wide - 2 * EDGE, high: high - TITLE - EDGE },
+        step = roundAbove((2 * APART * (this.reach.ahead + this.reach.aside)) / wide),
+        ways = [...this.ways, this.way];
+      this.space.paint(context, room, scene.theme, skeleton, this.reach, {
+        points,
+        touching,
+        ways,
+        step,
+        start: this.start,
+      });
+      context.fillStyle = scene.theme.muted;
+      context.fillText(
+        `${this.come(points)}, a square is ${metres(step, step)} wide`,
+        EDGE,
+        TITLE - 7,
+        wide - 2 * EDGE - BUTTON,
+      );
+      return;
+    }
     for (const frame of this.frames(wide, high, points?.[skeleton.middle] ?? [...this.start, 0])) {
       context.save();
       this.ground(context, frame, scene.theme);
@@ -200,16 +230,25 @@ export class Body {
       middle = this.points(look.pose)?.[skeleton?.middle ?? 0];
     while (this.way.length && this.way[this.way.length - 1][0] >= look.step) this.way.pop();
     const last = this.way[this.way.length - 1];
-    if (!middle || (last && distance(last.slice(1), middle.slice(0, 2)) > 2 * reach.ahead)) this.way = [];
+    this.ways = this.ways.filter((way) => way[0][0] < look.step);
+    if (!middle || (last && distance(last.slice(1), middle.slice(0, 2)) > 2 * reach.ahead)) {
+      // where it is back at the start another episode has begun; elsewhere somebody has gone to another step
+      const isBack = middle && distance(this.start, middle.slice(0, 2)) <= 2 * reach.ahead;
+      if (isBack && this.way.length > 1) this.ways = [...this.ways, this.way].slice(-WAYS);
+      this.way = [];
+    }
     if (middle) this.way.push([look.step, middle[0], middle[1]]);
   }
 
-  /** The way so far, on the ground. @param {CanvasRenderingContext2D} context @param {Frame} frame @param {Theme} theme */
+  /** The way so far, on the ground, and paler those of episodes before. @param {CanvasRenderingContext2D} context @param {Frame} frame @param {Theme} theme */
   trail(context, frame, theme) {
-    context.beginPath();
-    for (const [, x, y] of this.way) context.lineTo(...this.spot(frame, [x, y, 0]));
-    [context.strokeStyle, context.lineWidth] = [mixed(theme.positive, theme.box_fill, PALE), WAY];
-    context.stroke();
+    for (const way of [...this.ways, this.way]) {
+      const share = way === this.way ? PALE : PALER;
+      context.beginPath();
+      for (const [, x, y] of way) context.lineTo(...this.spot(frame, [x, y, 0]));
+      [context.strokeStyle, context.lineWidth] = [mixed(theme.positive, theme.box_fill, share), WAY];
+      context.stroke();
+    }
   }
 
   /** Which feet touch something. @param {Look} look @returns {boolean[]} */
@@ -441,8 +480,10 @@ export class Body {
    * @param {CanvasRenderingContext2D} context @param {Frame} frame @param {Theme} theme
    * @param {number[][] | null} points */
   title(context, frame, theme, points) {
-    const { left, top, wide, up } = frame,
-      y = top - 7;
+    const { left, top, up } = frame,
+      y = top - 7,
+      isCorner = top === TITLE && left + frame.wide + EDGE >= this.canvas.clientWidth,
+      wide = frame.wide - (isCorner ? BUTTON : 0);
     const said =
       up === 1
         ? 'from above, forward →'
@@ -479,6 +520,7 @@ export class Body {
       count = touching.filter(Boolean).length;
     const feet = touching.length ? `, ${count} of ${touching.length} feet touching` : '';
     this.words = points ? `the body ${this.come(points)}${feet}` : 'the body: its pose is not known';
-    this.canvas.setAttribute('aria-label', `${this.words}; from above, and from its right side`);
+    const from = this.space.on ? 'in space; arrow keys turn it' : 'from above, and from its right side';
+    this.canvas.setAttribute('aria-label', `${this.words}; ${from}`);
   }
 }

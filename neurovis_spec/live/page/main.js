@@ -268,7 +268,7 @@ const axis = new Axis(scrubber, part);
 const strips = new Strips(link, attention, beside, scrubber, axis, part('strips'), part('under'));
 const branches = new Branches(link, part, undo, (number, name) => strips.compare(number, name));
 const measuring = new Measuring(link, strips, part);
-const body = new Body(part('embodied'), part('posed'), part('bodily'), redraw);
+const body = new Body(part('embodied'), part('posed'), part('bodily'), part('spatial'), redraw);
 const share = new Share(link, camera, strips, attention, controls, body, redraw, part);
 
 /** Show the matrix in place of the picture, or the picture. @param {boolean} asMatrix */
