@@ -73,6 +73,14 @@ def test_axe_finds_nothing_whatever_is_open(theme: str, tmp_path: Path) -> None:
             await opened.ask("document.querySelector('#lesion').click()")
             await opened.until("document.querySelector('#turned').children.length")
             assert await violations(opened) == [], "turning"
+            await opened.ask("document.querySelector('#back').click()")
+            await opened.ask("document.querySelector('#mend').click()")
+            await opened.until("document.querySelectorAll('#others button').length == 4")
+            await opened.ask("document.querySelectorAll('#others button')[1].click()")
+            await opened.ask("document.querySelectorAll('#others button')[2].click()")
+            assert await violations(opened) == [], "a branch is compared and named"
+            await opened.key("Escape")
+            await opened.ask("document.querySelector('#picture').focus()")
             await opened.key("/")
             # names are written into the rows with the next frame
             await opened.until(f"{ROWS}.length > 3 && {NAMES}.every(name => name)")
