@@ -88,6 +88,15 @@ def test_axe_finds_nothing_whatever_is_open(theme: str, tmp_path: Path) -> None:
             await opened.key("Escape")
             await opened.key("?")
             assert await violations(opened) == [], "the keys"
+            await opened.key("?")
+            await opened.key("c")
+            typed = (
+                "document.querySelector('#measure').value = '{0}'; document.querySelector('#measuring').requestSubmit()"
+            )
+            await opened.ask(typed.format("K3"))
+            await opened.ask(typed.format("mean("))
+            await opened.until("document.querySelector('#mismeasured').classList.contains('wrong')")
+            assert await violations(opened) == [], "a curve is typed"
 
     asyncio.run(main())
 

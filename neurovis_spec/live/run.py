@@ -288,14 +288,12 @@ class Run:
                 self._go(self._event(asked.by))
             case Restart():
                 source.restart()
-                self._target, self._ended, self._loop = None, False, None
-                self._clock.start(now)
+                self._stand_elsewhere()
             case Branch():
                 source.branch()
             case Switch():
                 source.switch(asked.number)
-                self._target, self._ended, self._loop = None, False, None
-                self._clock.start(now)
+                self._stand_elsewhere()
             case Rename():
                 source.futures = _known(source, asked.number).renamed(asked.number, asked.name)
             case Forget():
@@ -326,16 +324,26 @@ class Run:
             case Unmeasure():
                 self._measure(self._typed.without(asked.number))
             case _ if callable(asked):
-                self._source, self._view = asked(source)
-                if self._source is not source:
-                    self._loop = None
-                    self._typed = self._typed.on(self._source.network)
-                self._redraw(refuse)
-                self._clock = self._clock_of(self._source, self._clock.speed)
-                self._clock.start(now)
-                self._ended, self._target = False, None
+                self._show_instead(asked, refuse)
             case _:
                 source.turn(asked)
+
+    def _stand_elsewhere(self) -> None:
+        """What was gone to, and played over and over, is of no concern any more."""
+        self._target, self._ended, self._loop = None, False, None
+        self._clock.start(time.perf_counter())
+
+    def _show_instead(self, change: Change, refuse: Refuse) -> None:
+        """Show another network, or another view of this one."""
+        source = self._source
+        self._source, self._view = change(source)
+        if self._source is not source:
+            self._loop = None
+            self._typed = self._typed.on(self._source.network)
+        self._redraw(refuse)
+        self._clock = self._clock_of(self._source, self._clock.speed)
+        self._clock.start(time.perf_counter())
+        self._ended, self._target = False, None
 
     def _play_over(self, asked: Loop) -> None:
         """Play these steps over and over. Raises SourceError for such as cannot be gone to."""

@@ -6,6 +6,7 @@ import { signed } from './attention.js';
 import { again, COLOURS, offer, plane, taken } from './joining.js';
 import { namesOf } from './protocol.js';
 import { THUMB } from './scrubber.js';
+import { dot } from './spikes.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./axis.js').Axis} Axis */
@@ -464,7 +465,14 @@ export class Strips {
   /** A raster has come. @param {Raster} raster */
   raster(raster) {
     for (const strip of [...this.pinned, this.held]) {
-      if (strip.what === RASTER && strip.id === raster.id) this.dot(strip, raster);
+      if (strip.what === RASTER && strip.id === raster.id)
+        dot(
+          strip.canvas,
+          strip.ends,
+          raster,
+          ...this.blank(strip.canvas),
+          `from step ${this.scrubber.low} to ${this.scrubber.high}`,
+        );
     }
   }
 
@@ -472,32 +480,14 @@ export class Strips {
    * @param {HTMLCanvasElement} canvas @returns {[CanvasRenderingContext2D, (step: number) => number]} */
   blank(canvas) {
     const { clientWidth: width, clientHeight: height } = canvas,
-      context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
-    [canvas.width, canvas.height] = [width * devicePixelRatio, height * devicePixelRatio];
-    context.scale(devicePixelRatio, devicePixelRatio);
+      context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d')),
+      [wide, high] = [width, height].map((length) => Math.floor(length * devicePixelRatio));
+    // another size is other memory, which costs more than the lines
+    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
+    context.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    [context.globalAlpha, context.lineWidth] = [1, 1];
     return [context, (step) => THUMB + this.scrubber.across(step) * (width - 2 * THUMB)];
-  }
-
-  /** Draw a raster: a row for each neuron, in it a mark where it fires; of several in a row as strong as their share.
-   * @param {Strip} strip @param {Raster} raster */
-  dot(strip, { first, every, bins, rows, ends, cells }) {
-    const { canvas } = strip,
-      [context, x] = this.blank(canvas),
-      row = (canvas.clientHeight - 4) / Math.max(1, rows),
-      wide = Math.max(1, x(every) - x(0));
-    let known = false;
-    context.fillStyle = getComputedStyle(canvas).color;
-    cells.forEach((share, at) => {
-      known ||= share < 255;
-      if (share === 0 || share === 255) return;
-      context.globalAlpha = Math.max(0.25, share / 254);
-      const middle = x(first + (at % bins) * every + (every - 1) / 2);
-      context.fillRect(middle - wide / 2, 2 + Math.floor(at / bins) * row, wide, Math.max(1, row - (row > 3 ? 1 : 0)));
-    });
-    [strip.ends[0].textContent, strip.ends[1].textContent] = [ends[0], ends[1] === ends[0] ? '' : (ends[1] ?? '')];
-    const steps = `from step ${this.scrubber.low} to ${this.scrubber.high}`,
-      which = ends[1] === ends[0] ? ends[0] : ends.join(' … ');
-    canvas.setAttribute('aria-label', `raster of ${which} ${steps}${known ? '' : ': nothing is known of these steps'}`);
   }
 
   /** Draw a trace: a line, up and down in each bin where it has several steps; above it marks where it fires, unless the
