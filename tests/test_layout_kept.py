@@ -150,9 +150,9 @@ def test_a_start_lays_out_once_whatever_is_asked_then(folder: Path, made: Counte
     source, view = show.stage(network)
     run = Run(source, view, lambda shown: None, lambda: False)
     desk = Desk(network, show.engine, show.view, run, lambda text: None)
-    for appearance in (Appearance(theme="dark"), Appearance(pathways=True), Appearance(pathways=True, theme="dark")):
-        view.otherwise(appearance)
-    run.ask(Draw(Appearance(theme="print")))
+    for appearance in (Appearance(activity=2), Appearance(pathways=True), Appearance(pathways=True, activity=2)):
+        view.otherwise(appearance).dressed("dark")
+    run.ask(Draw(Appearance(signal=2)))
     run.ask(Restart())
     run.start()
     run.end()

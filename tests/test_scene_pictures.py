@@ -268,7 +268,7 @@ def test_a_title_that_has_no_room_in_the_place_of_the_others_stands_in_its_mirro
 
     def placed(kept: list[Rect]) -> list[Text]:
         titles = in_one_place(boxes, Obstacles([], [], np.zeros((0, 2)), np.zeros(0)), THEMES["default"], kept)
-        return [titles[0], titles[1]]
+        return [titles[0].lines[0], titles[1].lines[0]]
 
     left, right = placed(kept)
     assert left.point == (10.0, right.point[1])
@@ -287,22 +287,26 @@ def test_boxes_that_compute_the_same_all_say_it_or_none_does() -> None:
         return Obstacles([], [], np.zeros((0, 2)), np.zeros(0))
 
     boxes = [Titled(left, wide, wide), Titled(right, narrow, narrow), Titled(other, long, long)]
-    for said in (in_one_place(boxes, free(), THEMES["default"]), elsewhere(boxes, free(), THEMES["default"])):
-        assert [text and text.text for text in (said[0], said[1], said[2])] == ["left", "right", "out · tanh"]
+    said = in_one_place(boxes, free(), THEMES["default"])
+    assert [said[place].words for place in range(3)] == ["left", "right", "out · tanh"]
+    # elsewhere it stands in two lines
+    found = [(one.words, len(one.lines)) for one in elsewhere(boxes, free(), THEMES["default"]) if one]
+    assert found == [("left · relu", 1), ("right · relu", 2), ("out · tanh", 1)]
     boxes[1] = Titled(replace(right, rect=wide), wide, wide)
-    assert {in_one_place([box], free(), THEMES["default"])[0].text for box in boxes} == {
+    assert {in_one_place([box], free(), THEMES["default"])[0].words for box in boxes} == {
         "left · relu", "right · relu", "out · tanh"
     }  # fmt: skip
     (alone,) = elsewhere([boxes[0]], free(), THEMES["default"], {" · relu"})  # in one place others do not say it
     assert alone
-    assert alone.text == "left"
+    assert alone.words == "left"
 
 
 def test_a_title_close_to_its_frame_does_not_cover_it() -> None:
     rect = (0.0, 0.0, 34.0, 60.0)
     obstacles = Obstacles([], [], np.zeros((0, 2)), np.zeros(0))
     obstacles.add_frame(outline(rect))
-    title = in_one_place([Titled(Box("abc", "abc", (0,), rect), rect, rect)], obstacles, THEMES["default"])[0]
+    heading = in_one_place([Titled(Box("abc", "abc", (0,), rect), rect, rect)], obstacles, THEMES["default"])[0]
+    (title,) = heading.lines
     assert title.point[0] == 5.0  # nearer to the side than the ten units that titles leave where they can
     assert not title.halo
 
