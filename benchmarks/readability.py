@@ -67,7 +67,12 @@ def read(network: CompiledNetwork) -> Read:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of lines that are left out, which the picture says itself
             network.render(path)
-        root = ET.fromstring(path.read_bytes())
+        return read_svg(network, path.read_bytes())
+
+
+def read_svg(network: CompiledNetwork, svg: bytes) -> Read:
+    """A picture of a network, read."""
+    root = ET.fromstring(svg)
     width, height = float(root.get("width", "0")), float(root.get("height", "0"))
     unit = width / float(root.get("viewBox", "0 0 1 1").split()[2])
     group = {

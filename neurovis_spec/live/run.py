@@ -24,6 +24,7 @@ from neurovis_spec.live.clock import FRAMES, Clock, Pace
 from neurovis_spec.live.commands import (
     Appearance,
     Branch,
+    Branching,
     Command,
     Draw,
     Event,
@@ -289,23 +290,8 @@ class Run:
             case Restart():
                 source.restart()
                 self._stand_elsewhere()
-            case Branch():
-                source.branch()
-            case Switch():
-                source.switch(asked.number)
-                self._stand_elsewhere()
-            case Rename():
-                source.futures = _known(source, asked.number).renamed(asked.number, asked.name)
-            case Forget():
-                source.futures = _known(source, asked.number).forgotten(asked.number)
-            case Restore():
-                restored = source.futures.restored()
-                if restored is None:
-                    raise SourceError("what was deleted is no longer kept")
-                source.futures = restored
-            case Undo():
-                source.take_back(asked.number)
-                self._ended = False
+            case Branch() | Switch() | Rename() | Forget() | Restore() | Undo():
+                self._branch(asked)
             case Draw():
                 self.appearance = asked.appearance
                 self._redraw(refuse)
@@ -327,6 +313,28 @@ class Run:
                 self._show_instead(asked, refuse)
             case _:
                 source.turn(asked)
+
+    def _branch(self, asked: Branching) -> None:
+        """Have the run go on in another branch, or have these be others. Raises SourceError."""
+        source = self._source
+        match asked:
+            case Branch():
+                source.branch()
+            case Switch():
+                source.switch(asked.number)
+                self._stand_elsewhere()
+            case Rename():
+                source.futures = _known(source, asked.number).renamed(asked.number, asked.name)
+            case Forget():
+                source.futures = _known(source, asked.number).forgotten(asked.number)
+            case Restore():
+                restored = source.futures.restored()
+                if restored is None:
+                    raise SourceError("what was deleted is no longer kept")
+                source.futures = restored
+            case Undo():
+                source.take_back(asked.number)
+                self._ended = False
 
     def _stand_elsewhere(self) -> None:
         """What was gone to, and played over and over, is of no concern any more."""

@@ -275,12 +275,6 @@ def view_of(
     largest = np.ones(len(seen.thickness))
     for scale in seen.thickness_scales:
         largest[seen.on_thickness(scale)] = scale.shown(scale.reaches or 1.0)
-    frame = planned.frame
-    bar = BAR if planned.theme.ends == "signs" else 0  # a theme may know nothing but arrows
-    kinds = {"isBar": bar, "isFaint": FAINT, "isNegative": NEGATIVE, "isClamped": CLAMPED, "isUndefined": UNDEFINED}
-    # of a picture in which something is collapsed nothing can be put elsewhere
-    where = {"scale": 0.0 if drawn.any else frame.scale, "left": frame.left, "top": frame.top}
-    constants = {"levels": LEVELS, "fineness": FINENESS, "shares": SHARES, "share": _SHARE, **kinds, **where}
     scene = _scene(drawn, planned, seen)
     rows = order_of(drawn.network, stands, range(len(drawn.network.neurons)))
     written = compiled.spec.render
@@ -290,16 +284,15 @@ def view_of(
     names = {"named": [list(one) for one in listed.lists], "names": listed.of.tolist() if len(quantities) else []}
     curves = curves_of(drawn)
     beside = Beside(network, len(quantities))
-    told_beside = {"inputs": beside.input_names, "sensors": beside.sensor_names, "words": words_of(network)}
     begins = {
         "boxes": {name: list(one) for name, one in planned.boxes.items()},
         "curves": [asdict(curve) for curve in curves.shown],
-        "beside": told_beside,
+        "beside": {"inputs": beside.input_names, "sensors": beside.sensor_names, "words": words_of(network)},
     }
     joined, bands = _bundles(planned)
     by_hand = {**declared(compiled), **ranges_of(drawn)}
     more = {**by_hand, **names, **begins, **bands, "themes": list(THEMES), "themed": themed}
-    words = content(drawn.network, scene, rows, constants, more)
+    words = content(drawn.network, scene, rows, _constants(drawn, planned), more)
     otherwise = otherwise or partial(view_of, compiled, gains, theme, engine, layout=layout)
     dress = partial(_dressed, compiled, gains, appearance, layout, otherwise)
     anew = partial(_planned, stands, seen, settings)
@@ -307,6 +300,16 @@ def view_of(
     names_of = quantities, listed, curves, beside
     sums = Sums.of(joined, drawn.counts)
     return View(drawn, seen, planned, largest, stands, words, *how, *names_of, anew, sums)
+
+
+def _constants(drawn: Gathered, planned: Plan) -> dict[str, float]:
+    """What the numbers of frames mean, and where the layout stands in the picture: of one in which something is
+    collapsed nothing can be put elsewhere."""
+    frame = planned.frame
+    bar = BAR if planned.theme.ends == "signs" else 0  # a theme may know nothing but arrows
+    kinds = {"isBar": bar, "isFaint": FAINT, "isNegative": NEGATIVE, "isClamped": CLAMPED, "isUndefined": UNDEFINED}
+    where = {"scale": 0.0 if drawn.any else frame.scale, "left": frame.left, "top": frame.top}
+    return {"levels": LEVELS, "fineness": FINENESS, "shares": SHARES, "share": _SHARE, **kinds, **where}
 
 
 def _dressed(

@@ -484,12 +484,11 @@ export class Body {
       y = top - 7,
       isCorner = top === TITLE && left + frame.wide + EDGE >= this.canvas.clientWidth,
       wide = frame.wide - (isCorner ? BUTTON : 0);
-    const said =
-      up === 1
-        ? 'from above, forward →'
-        : points
-          ? `from its right side · ${this.come(points)}`
-          : 'its pose is not known';
+    const side = points
+        ? [`from its right side · ${this.come(points)}`, 'from its right side']
+        : ['its pose is not known'],
+      either = up === 1 ? ['from above, forward →', 'from above'] : side;
+    const said = either.find((one) => context.measureText(one).width <= wide) ?? either[either.length - 1];
     context.fillStyle = theme.muted;
     context.fillText(said, left, y, wide);
     if (up === 2 || !this.skeleton?.feet.length) return;
