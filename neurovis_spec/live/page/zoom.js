@@ -18,10 +18,10 @@ import { Past } from './raster.js';
  *   title: Shape | null}} Box */
 
 /** A box is closed where its labels are smaller than this, or, without labels, its discs, in pixels of a page, unless the
- * picture is shown almost in its own size, or it holds others and is so large, or all neurons. */
+ * picture is shown in its own size, or it holds others and is so large, or all neurons. */
 const LEGIBLE = 7,
   TINY = 3,
-  OWN = 0.75,
+  OWN = 1,
   ROOMY = 150;
 /** How large labels grow with what they are of, those on discs and others, in pixels of a page; those are larger alone
  * that are so in the picture. */
