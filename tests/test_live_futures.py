@@ -16,7 +16,7 @@ from neurovis_spec.live import futures as kept
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.futures import Future
 from neurovis_spec.live.history import Bins, Members, Ring
-from neurovis_spec.live.protocol import command_of, status_message
+from neurovis_spec.live.protocol import ProtocolError, command_of, status_message
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Reach, SourceError
@@ -380,3 +380,78 @@ def test_a_status_tells_them_and_a_message_goes_there() -> None:
     assert left.history() is source.futures.all[0].history
     assert repr(command_of('{"type": "switch", "number": 1}')) == "Switch(number=1)"
     assert isinstance(source.futures.left, Future)
+
+
+def test_what_is_undone_goes_on_as_the_branch_that_was_turned_alike_and_no_other() -> None:
+    """One that was turned in place of another has its number."""
+    source = at(5)
+    source.turn(Set({"pull": 0.3}))
+    for _ in range(10):
+        source.advance()
+    source.go(5)
+    source.turn(Set({"pull": 0.6}))
+    source.turn(Lesion("A1"))
+    source.take_back(source.turned[-1].number)
+    assert [entry.turn for entry in source.turned] == [Set({"pull": 0.6})]
+    assert source.parameters["pull"] == 0.6
+
+
+def test_turns_after_an_edit_of_words_have_numbers_of_their_own() -> None:
+    source = at(10)
+    source.turn(Set({"pull": 0.3}))
+    for _ in range(10):
+        source.advance()
+    source.turn(Lesion("A1"))
+    source.advance()
+    source.go(15)
+    edited = carried(source, nv.compile_text(TEXT + "# a word\n").simulator())
+    edited.switch(max(one.number for one in edited.futures.all))
+    edited.go(edited.reach.last)
+    edited.turn(Set({"pull": 0.8}))
+    numbers = [entry.number for entry in edited.turned]
+    assert len(set(numbers)) == len(numbers) > 1
+
+
+def test_what_is_undone_where_an_edit_left_branches_of_an_older_spec_is_none_of_these() -> None:
+    source = at(10)
+    source.go(0)
+    source.turn(Set({"pull": 0.3}))
+    edited = carried(source, nv.compile_text(TEXT.replace("count: 3", "count: 4")).simulator())
+    edited.take_back(edited.turned[-1].number)
+    assert edited.turned == ()
+
+
+def test_what_needs_a_turn_keeps_it_from_being_undone() -> None:
+    bounded = TEXT.replace("max: 1}", "max: top}").replace("parameters: {", "parameters: {top: 0.5, ")
+    source = SimulatedSource(nv.compile_text(bounded).simulator())
+    source.turn(Set({"top": 1.0}))
+    first = source.turned[0].number
+    source.turn(Set({"pull": 0.9}))
+    with pytest.raises(SourceError):
+        source.take_back(first)
+    assert [entry.turn for entry in source.turned] == [Set({"top": 1.0}), Set({"pull": 0.9})]
+    assert source.parameters["pull"] == 0.9
+
+
+def test_a_weight_that_has_left_all_bounds_can_be_set_and_told_of() -> None:
+    text = "neurovis: 1\nname: x\nneurons: {A: {initial: 1}, B: {initial: 1}}\n"
+    text += "connections: {A -> A: 1, A -> B: {weight: 1, plasticity: {hebbian: {rate: 1000}}}}\n"
+    compiled = nv.compile_text(text)
+    source = SimulatedSource(compiled.simulator())
+    while np.isfinite(source.seen().snapshot.weights).all():
+        source.advance()
+    source.turn(Weigh("A -> B", 0.5))
+    view = view_of(compiled, compiled.gains)
+    status = json.loads(status_message(Run(source, view, lambda shown: None, lambda: False).shown().status, True))
+    assert [entry["back"] for entry in status["turned"]] == [None]
+    number = source.turned[0].number
+    source.advance()
+    with pytest.raises(SourceError, match="not one finite number"):
+        source.take_back(number)
+
+
+def test_messages_name_a_branch_and_hold_no_half_characters() -> None:
+    asked = '{"type": "trace", "items": ["n0"], "first": 0, "every": 1, "bins": 1, "branch": 3}'
+    assert getattr(command_of(asked), "branch", None) == 3
+    with pytest.raises(ProtocolError, match="half a character"):
+        command_of('{"type": "rename", "number": 0, "name": "\\ud83d"}')

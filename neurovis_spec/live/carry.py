@@ -20,6 +20,7 @@ from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Projection
+from neurovis_spec.live.futures import called
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError
 from neurovis_spec.live.turns import Feed, Turned, feed, turn
@@ -46,7 +47,9 @@ def _carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
     was, network, turned = old.network, simulation.network, old.turned
     past = old.past()
     source = _going_on(old, simulation, turned)
-    source.futures = past if was.mark == network.mark else past.of_older_spec(was, network)
+    source.number_behind(old)
+    same = was.mark == network.mark and called(was) == called(network)
+    source.futures = past if same else past.of_older_spec(was, network)
     return source
 
 

@@ -81,11 +81,12 @@ class Futures:
 
     def left_at(self, at: int, turned: Sequence[Turned]) -> Future | None:
         """The one that was left last behind a step until which it was ``turned`` in this way."""
-        numbers = [entry.number for entry in turned]
+        wanted = [(entry.number, entry.turn) for entry in turned]  # one in place of another has its number
         found = [
             one
             for one in self.all
-            if one.at == at and [entry.number for entry in one.turned if entry.step <= at] == numbers
+            if one.at == at and not one.older
+            if [(entry.number, entry.turn) for entry in one.turned if entry.step <= at] == wanted
         ]
         return max(found, key=lambda one: one.number, default=None)
 
@@ -202,11 +203,11 @@ def _places(network: Network, now: Network) -> dict[Of, IntArray]:
     return {
         "neurons": of(network.neurons.names, now.neurons.names),
         "connections": of(network.connection_names, now.connection_names),
-        "quantities": of(_called(network), _called(now)),
+        "quantities": of(called(network), called(now)),
     }
 
 
-def _called(network: Network) -> tuple[str, ...]:
+def called(network: Network) -> tuple[str, ...]:
     """How quantities are called, and behind them inputs and sensors, as no quantity is."""
     quantities = Quantities(network).names
     beside = Beside(network, len(quantities))

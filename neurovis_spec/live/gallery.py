@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from html import escape
 from itertools import groupby
 from pathlib import Path
@@ -21,6 +22,7 @@ from neurovis_spec.live.commands import Present
 from neurovis_spec.live.hub import Client
 from neurovis_spec.live.listing import Listed
 from neurovis_spec.live.live import heed_signals
+from neurovis_spec.live.protocol import Themed, command_of
 from neurovis_spec.live.rooms import MOST, Open, Rooms
 from neurovis_spec.live.server import Front, Place, policy
 from neurovis_spec.live.thumbnails import Draw, Thumbnails
@@ -32,12 +34,14 @@ class Gallery(Front):
     def __init__(self, access: Access, listed: tuple[Listed, ...], draw: Draw, open_: Open) -> None:
         super().__init__(access)
         self._listed, self._rooms, self._thumbnails = listed, Rooms(listed, open_), Thumbnails(draw)
+        self._drawing = ThreadPoolExecutor(1)  # one after the other, and in the way of nothing else
         self._gallery = page_of(listed)
         self._gallery_headers = {"Content-Security-Policy": policy(self._gallery)}
 
     async def stop(self) -> None:
         """Say goodbye to everybody, and end all that runs."""
         await super().stop()
+        self._drawing.shutdown(wait=False, cancel_futures=True)
         self._rooms.end()
 
     def _number(self, request: web.Request) -> int | None:
@@ -54,7 +58,8 @@ class Gallery(Front):
             return self._refuse(404, "nothing is listed by this number")
         if request.path != PICTURE:
             return self._live_page()
-        found = await asyncio.to_thread(self._thumbnails.of, self._listed[number])
+        loop = asyncio.get_running_loop()
+        found = await loop.run_in_executor(self._drawing, self._thumbnails.of, self._listed[number])
         if found.words:
             return web.Response(text=found.words, content_type="text/plain", charset="utf-8")
         response = web.Response(text=found.svg, content_type="image/svg+xml", charset="utf-8")
@@ -70,8 +75,12 @@ class Gallery(Front):
             return Refused(503, f"{MOST} networks are looked at already")
 
         def take(client: Client, message: bytes | str) -> None:
-            if room.reception is not None:  # until then nothing is shown that could be asked
+            if room.reception is not None:
                 room.reception.take(client, message)
+            elif isinstance(message, str):  # nothing is shown yet, but the theme of what will be is asked for once
+                wish = command_of(message)
+                if isinstance(wish, Themed):
+                    room.hub.dress(client, wish)
 
         def come() -> None:
             if room.run is not None:

@@ -54,7 +54,7 @@ from neurovis_spec.live.protocol import (
     undefined_message,
     values_message,
 )
-from neurovis_spec.live.run import Run, Shown
+from neurovis_spec.live.run import Run, Shown, Status
 from neurovis_spec.live.source import NOTHING, Drawn
 from neurovis_spec.live.sums import SumArray
 from neurovis_spec.live.typed import findings
@@ -390,7 +390,7 @@ class Hub:
             self._changed_at[_changed(before, shown)] = self._serial
             one, other = before.glance.sums, shown.glance.sums
             self._summed_at[((one != other) & ~(np.isnan(one) & np.isnan(other))).any(axis=1)] = self._serial
-        if before is None or before.status != shown.status or not self._statuses:
+        if before is None or not _told_alike(before.status, shown.status) or not self._statuses:
             self._statuses = {owner: status_message(shown.status, owner, self._takes) for owner in (True, False)}
         self._shown = shown
         self._frames.clear()
@@ -430,6 +430,13 @@ def _values(shown: Shown, items: tuple[str, ...]) -> dict[str, float]:
             value = float(shown.history.read(members, Bins(step, 1, 1))[0, 0])
             found |= {} if math.isnan(value) else {item: value}
     return found
+
+
+def _told_alike(one: Status, other: Status) -> bool:
+    """Whether a client is told the same of both; a turn that is taken back and taken anew has another number."""
+    if one != other:
+        return False
+    return one.turned is other.turned or [e.number for e in one.turned] == [e.number for e in other.turned]
 
 
 def _changed(before: Shown, now: Shown) -> npt.NDArray[np.bool_]:

@@ -179,8 +179,11 @@ def _pins(shown: Placed, now: Compilation, text: str, compile: Compile) -> dict[
     """Pins that reproduce the layout that is shown: those made by hand and, as the rest of the network is fitted to
     pins, those of all neurons that would otherwise stand elsewhere."""
     names = {*shown.moved, *_moved(shown, _stated(now))}
+    chosen: dict[Keys, Value] = {}
+    if shown.layout.direction is not None and not now.network.layout.directed:
+        chosen["layout", "direction"] = shown.layout.direction  # with pins the page chooses none
     for _ in range(_ROUNDS):
-        values = _positions(shown, now, names)
+        values = {**_positions(shown, now, names), **chosen}
         made = compile(put(text, values) if values else text).arranged(shown.engine)
         others = _moved(shown, made.positions)
         if not others:

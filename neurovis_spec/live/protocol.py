@@ -62,7 +62,7 @@ from neurovis_spec.live.run import Status
 from neurovis_spec.live.saving import MOST_SECONDS
 from neurovis_spec.live.source import Drawn, Reach
 from neurovis_spec.live.sums import SumArray
-from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh
+from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh, is_finite
 from neurovis_spec.live.typed import LONGEST
 from neurovis_spec.live.undefined import Undefined
 from neurovis_spec.live.view import Glance
@@ -165,7 +165,7 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         owner=owner,
         can={"takes": sorted(able.takes | takes), "ends": able.ends, "arrives": able.arrives},
         parameters={name: value for name, value in status.parameters.items() if math.isfinite(value)},
-        fed={name: list(values) for name, values in status.fed.items()},
+        fed={name: list(values) for name, values in status.fed.items() if all(map(math.isfinite, values))},
         learning=dict(status.learning),
         turned=[_listed(entry) for entry in status.turned[-_LISTED:]],
         events=list(status.events[:_LISTED]),
@@ -207,7 +207,8 @@ def _future(future: Future) -> dict[str, object]:
 def _listed(entry: Turned) -> dict[str, object]:
     """A turn with its number, what takes it back, and of a drag the step at which it began."""
     more = {} if entry.since is None else {"since": entry.since}
-    return {**_turned(entry), "number": entry.number, "back": entry.back and _message(entry.back), **more}
+    back = entry.back if entry.back is None or is_finite(entry.back) else None  # JSON has no word for what is not
+    return {**_turned(entry), "number": entry.number, "back": back and _message(back), **more}
 
 
 def _turned(entry: Turned) -> dict[str, object]:
@@ -386,9 +387,20 @@ def command_of(text: str) -> Command | Request | Wish:
     if wanted is None:
         raise ProtocolError("the type of the message is unknown")
     checks, make = wanted
+    if not _encodes(message):
+        raise ProtocolError("the message holds half a character")
     if not set(checks) - _OPTIONAL <= set(message) <= set(checks):
         raise ProtocolError(f"a message '{kind}' has other members")
     return make(**{name: checks[name](value) for name, value in message.items()})
+
+
+def _encodes(value: object) -> bool:
+    """Whether all texts can be sent on: JSON may hold one half of a pair of surrogates."""
+    try:
+        json.dumps(value, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _no_constant(name: str) -> object:
@@ -537,6 +549,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
             "items": _items,
             "rasters": _items,
             "pairs": _items,
+            "branch": _whole(0, _MOST),
             "first": _whole(0, _MOST),
             "every": _whole(1, _EVERY),
             "bins": _whole(1, _BINS),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import hashlib
+import logging
 import re
 import socket
 import time
@@ -32,6 +33,7 @@ from neurovis_spec.live.shipped import page
 MOST_CLIENTS, MOST_CONNECTIONS = 128, 256
 #: Seconds in which a connection must have asked for something, a message must be on its way, and between pings.
 ASKING, SENDING, PINGS = 10.0, 15.0, 20.0
+_LOG: Final = logging.getLogger(__name__)
 _POLICY: Final = "Content-Security-Policy"
 #: Messages a second that a client may send in the long run, and at once.
 RATE, BURST = 200, 400
@@ -196,7 +198,9 @@ class Front(ABC):
                 for message in list(hub.messages(client)):
                     async with asyncio.timeout(SENDING):
                         await (stream.send_bytes(message) if isinstance(message, bytes) else stream.send_str(message))
-        except (TimeoutError, ConnectionError):
+        except Exception as error:
+            if not isinstance(error, TimeoutError | ConnectionError):
+                _LOG.exception("a client cannot be told anything any more")
             if request.transport is not None:
                 request.transport.abort()
 

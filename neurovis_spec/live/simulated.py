@@ -37,6 +37,7 @@ from neurovis_spec.live.turns import (
     Weigh,
     carried_out,
     feed,
+    is_finite,
     opposite,
     rules,
     taken,
@@ -339,6 +340,10 @@ class SimulatedSource:
         if refused:
             raise SourceError(refused)
 
+    def number_behind(self, other: SimulatedSource) -> None:
+        """Number turns behind all those of another source, whose branches this one takes over."""
+        self._taken = max(self._taken, other._taken)
+
     def take_back(self, number: int) -> None:
         """Take a turn back, by its number: at the step at which it was taken, or before that, as though it had not
         been, with what came after it without it; later by its opposite. Raises SourceError."""
@@ -346,6 +351,8 @@ class SimulatedSource:
         if entry is None:
             raise SourceError("what was turned is no part of this branch")
         is_later = entry.since is not None or entry.step < self.step or self._past.before(entry.step) is None
+        if is_later and entry.back is not None and not is_finite(entry.back):
+            raise SourceError("what was before is not one finite number: go back to where it was turned")
         if is_later and entry.back is not None:
             self.turn(entry.back)
             return
@@ -367,7 +374,9 @@ class SimulatedSource:
         self._make_up_to(step, again=True)
         here = [entry.turn for entry in rest if entry.step == step]
         for what in here:
-            self._turn(what)
+            refused = self._turn(what)
+            if refused:  # it needs what is taken back
+                raise SourceError(refused)
         if here:
             self._keep(self._kept())
             self._seen = self._turned_seen()

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from threading import Lock
 from typing import Final, TypeAlias
 
 from neurovis_spec.diagnostics import SpecError, show_text
@@ -37,27 +37,37 @@ class Thumbnail:
 
 
 class Thumbnails:
-    """Makes pictures one after the other, from any thread."""
+    """Makes pictures."""
 
     def __init__(self, draw: Draw) -> None:
-        self._draw, self._one_by_one = draw, Lock()
+        self._draw = draw
 
     def of(self, listed: Listed) -> Thumbnail:
         """The picture of a spec."""
-        with self._one_by_one:
-            key = json.dumps([_program(), str(listed.path), listed.text])
-            known = _known(key)
-            if known is not None:
-                return known
-            try:
-                svg, files = self._draw(listed)
-            except SpecError as error:
-                return Thumbnail("", show_text(error.diagnostics, error.sources))
-            except Exception as error:  # a layout engine, ours or anybody's, may fail
-                return Thumbnail("", f"{type(error).__name__}: {error}")
-            now = [[str(path), mark] for path, mark in sorted(marks(files).items())]
+        key = json.dumps([_program(), str(listed.path), listed.text])
+        known = _known(key)
+        if known is not None:
+            return known
+        begun = time.time_ns()
+        try:
+            svg, files = self._draw(listed)
+        except SpecError as error:
+            return Thumbnail("", show_text(error.diagnostics, error.sources))
+        except Exception as error:  # a layout engine, ours or anybody's, may fail
+            return Thumbnail("", f"{type(error).__name__}: {error}")
+        found = marks(files)
+        if not any(_changed_since(path, begun) for path in found):
+            now = [[str(path), mark] for path, mark in sorted(found.items())]
             KEPT.keep(key, json.dumps([now, svg]).encode())
-            return Thumbnail(svg, "")
+        return Thumbnail(svg, "")
+
+
+def _changed_since(path: Path, when: int) -> bool:
+    """Whether a file may have been written while it was drawn, so that the picture is of what it was before."""
+    try:
+        return path.stat().st_mtime_ns >= when
+    except OSError:
+        return True
 
 
 def _known(key: str) -> Thumbnail | None:

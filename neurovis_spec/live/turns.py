@@ -7,6 +7,7 @@ Simulation. While a slider is dragged its values are ``moving``: the whole drag 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, TypeAlias
@@ -108,6 +109,19 @@ class Turned:
         return replace(self, number=before.number, back=before.back, since=None if since == self.step else since)
 
 
+def is_finite(turn: Turn) -> bool:
+    """Whether all numbers that a turn gives are finite; those of a rule that diverges, and of what events set, need
+    not be."""
+    match turn:
+        case Set():
+            return all(map(math.isfinite, turn.values.values()))
+        case Feed():
+            return all(map(math.isfinite, turn.values))
+        case Hold() | Weigh():
+            return math.isfinite(turn.value)
+    return True
+
+
 def same_value(one: Turn, other: Turn) -> bool:
     """Whether both set the same parameters or the same weights, feed the same input or clamp the same neurons."""
     match one, other:
@@ -170,7 +184,7 @@ def opposite(
         case Learn():
             return Learn(what.connections, not what.on)
         case Weigh():
-            return Weigh(what.connections, what.value if weight is None else weight)
+            return Weigh(what.connections, math.nan if weight is None else weight)  # several had different ones
 
 
 def turn(simulation: Simulation, what: Set | Hold | Release | Lesion | Mend | Learn | Weigh) -> None:

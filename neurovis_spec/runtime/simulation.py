@@ -404,12 +404,14 @@ class Simulation:
         self._reader.use(self._state)
 
     def weight_of(self, connections: str) -> float | None:
-        """w[k] of the first of the connections (``K -> O``) that a reference names; None where it names none."""
+        """w[k] of all the connections (``K -> O``) that a reference names; None where they differ, and where it names
+        none."""
         try:
             _, members = self._parts(connections)
         except KeyError:
             return None
-        return float(self._state.weights[members[0]]) if len(members) else None
+        weights = self._state.weights[members]
+        return float(weights[0]) if len(weights) and (weights == weights[0]).all() else None
 
     def set_weight(self, connections: str, value: float) -> None:
         """Give connections (``K3 -> O``) this weight from step k on, as an event does (``set: {K3 -> O: 0.4}``): one
