@@ -105,7 +105,7 @@ export class Range {
     if (high - low < FEWEST) high = low + FEWEST;
     [low, high] = [Math.max(look.first, low), Math.min(look.last, high)];
     this.scrubber.range = low <= look.first && high >= look.last ? null : [low, high];
-    if (!this.scrubber.range && this.looped) this.link.ask('unloop');
+    if (!this.scrubber.range && this.looped && this.owner) this.link.ask('unloop');
     this.show();
   }
 
@@ -129,7 +129,7 @@ export class Range {
 
   /** Say what is shown alone, and whether it is played over and over. */
   show() {
-    this.zoomed.hidden = !this.scrubber.range && !this.looped;
+    this.zoomed.hidden = !this.scrubber.range && !(this.looped && this.owner);
     this.loop.hidden = !this.owner;
     this.loop.setAttribute('aria-pressed', String(this.looped !== null));
     this.loop.title = this.looped

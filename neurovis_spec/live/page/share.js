@@ -3,6 +3,7 @@
  */
 
 import { pixelsOf } from './save.js';
+import { PINS } from './strips.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./body.js').Body} Body */
@@ -38,17 +39,18 @@ export class Share {
     this.begun = '';
     this.isBegun = false;
     this.film = /** @type {HTMLButtonElement} */ (part('film'));
+    this.matrix = part('matrix');
     const address = part('link'),
       picture = part('clip');
     address.onclick = () => {
       this.keep();
-      this.told(address, navigator.clipboard.writeText(location.href));
+      this.told(address, async () => navigator.clipboard.writeText(location.href));
     };
     picture.onclick = () => {
       const { scene, look } = this.link;
       if (!scene || !look) return;
       const png = pixelsOf(scene, look, body);
-      this.told(picture, navigator.clipboard.write([new ClipboardItem({ 'image/png': png })]));
+      this.told(picture, async () => navigator.clipboard.write([new ClipboardItem({ 'image/png': png })]));
     };
     part('present').onclick = () => this.present();
     document.addEventListener('fullscreenchange', () => {
@@ -56,12 +58,12 @@ export class Share {
     });
   }
 
-  /** Say on a button that something was copied, or that it could not be. @param {HTMLElement} button @param {Promise<void>} copied */
-  async told(button, copied) {
+  /** Say on a button that something was copied, or that it could not be. @param {HTMLElement} button @param {() => Promise<void>} copy */
+  async told(button, copy) {
     const words = button.dataset.words ?? button.textContent ?? '';
     button.dataset.words = words;
     try {
-      await copied;
+      await copy();
       button.textContent = 'copied';
     } catch {
       button.textContent = 'not allowed by the browser';
@@ -115,7 +117,7 @@ export class Share {
     for (const { id, data } of this.attention.groups.values()) {
       if ((data.neuron ?? data.connection) === name) return what ? `${id}.${what}` : id;
     }
-    return /^e\d+$/.test(name) && this.strips.group(name) ? name : '';
+    return /^[eis]\d+$/.test(name) && this.strips.group(name) ? name : '';
   }
 
   /** The curves that are pinned, by their names. @returns {string} */
@@ -133,7 +135,9 @@ export class Share {
     if (!controls.playing && link.look) said.set('step', String(link.look.step));
     if (controls.speed.value !== '1') said.set('speed', controls.speed.value);
     const at = camera.unit(camera.window[0] / 2, camera.window[1] / 2);
-    const isWhole = camera.zoom === 1 && !camera.shift[0] && !camera.shift[1];
+    const isWhole =
+      this.matrix.getAttribute('aria-pressed') === 'true' ||
+      (camera.zoom === 1 && !camera.shift[0] && !camera.shift[1]);
     if (!isWhole) said.set('view', [camera.zoom, ...at].map((one) => one.toPrecision(6)).join(' '));
     if (curves !== this.begun) said.set('curves', curves);
     return said.toString();
@@ -155,9 +159,14 @@ export class Share {
     const view = said.get('view')?.split(' ').map(number) ?? [];
     if (view.length === 3 && !view.includes(null)) {
       const [zoom, ...at] = /** @type {number[]} */ (view);
-      camera.way = null;
-      camera.zoom = Math.min(64, Math.max(0.25, zoom));
-      camera.shift = at.map((one, axis) => camera.scale * (camera.size[axis] / 2 - one));
+      // once the window has found its shape
+      const see = () => {
+        camera.way = null;
+        camera.zoom = Math.min(64, Math.max(0.25, zoom));
+        camera.shift = at.map((one, axis) => camera.scale * (camera.size[axis] / 2 + camera.corner[axis] - one));
+        this.redraw();
+      };
+      requestAnimationFrame(() => requestAnimationFrame(see));
     }
     if (curves !== null) {
       strips.pinned = [];
@@ -169,6 +178,7 @@ export class Share {
             names: names.map((name) => name.split(OF)[0]),
           }))
           .filter(({ items }) => items[0] && items.every(Boolean)),
+        PINS,
       );
     }
     if (controls.owner && [...controls.speed.options].some(({ value }) => value === speed))

@@ -32,7 +32,9 @@ const SPIKE = 'spike';
 const RASTER = '*';
 
 /** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is, and how pale that of a future that was left; milliseconds between two traces that are asked for, and until one is asked for again. */
-const PINS = 8,
+export const PINS = 8;
+/** The most that is drawn at once: what joined curves are besides is left out. */
+const TRACED = 24,
   MARK = 6,
   HIGH = 48,
   SHARE = 0.3,
@@ -199,10 +201,9 @@ export class Strips {
     strip.join.focus();
   }
 
-  /** Pin the strips that a page begins with, as far as there is room for them. @param {Curve[]} curves */
-  begin(curves) {
-    const room = Math.max(1, Math.floor((SHARE * innerHeight) / HIGH) - 1);
-    for (const { items, names } of curves.slice(0, room)) {
+  /** Pin the strips that a page begins with, as far as there is room for them, or so many. @param {Curve[]} curves @param {number} [most] */
+  begin(curves, most = Math.max(1, Math.floor((SHARE * innerHeight) / HIGH) - 1)) {
+    for (const { items, names } of curves.slice(0, most)) {
       const [id, what] = items[0].split('.'),
         strip = this.strip();
       this.pinned.push(strip);
@@ -400,7 +401,9 @@ export class Strips {
     const traced = this.traced(),
       others = [...this.pinned, this.held].filter(({ what }) => what === RASTER),
       pairs = [...new Set(this.pinned.flatMap(({ key, against }) => (against ? [key, against.key] : [])))];
-    const items = [...new Set(traced.flatMap((strip) => [this.marks(strip), ...this.keys(strip)]))].filter(Boolean),
+    const items = [...new Set(traced.flatMap((strip) => [this.marks(strip), ...this.keys(strip)]))]
+        .filter(Boolean)
+        .slice(0, TRACED),
       rasters = [...new Set(others.map(({ id }) => id))].slice(0, PINS);
     for (const { key, value } of [...this.pinned, this.held]) {
       const now = this.attention.values[key],

@@ -14,6 +14,8 @@ import { say } from './say.js';
 /** A message that was sent. @typedef {{type: string, [member: string]: unknown}} Asked */
 /** A turn as it was asked for, until the status tells it; by `act` it is done again. @typedef {{asked: Asked, gesture: number, act: Act | null}} Pending */
 
+/** What has an undo of its own. */
+const WRITTEN = 'textarea, input:not([type=range], [type=checkbox])';
 /** The most acts that are kept. */
 const MOST = 200;
 /** The messages that are turns. */
@@ -68,8 +70,7 @@ export class Undo {
   key(event) {
     const at = /** @type {Element} */ (event.target),
       pressed = event.key.toLowerCase();
-    if (!(event.ctrlKey || event.metaKey) || event.altKey || at.matches('textarea, [type=search], [type=number]'))
-      return;
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || at.matches(WRITTEN)) return;
     if (pressed !== 'z' && pressed !== 'y') return;
     event.preventDefault();
     if (pressed === 'z' && !event.shiftKey) this.back();
@@ -219,7 +220,7 @@ export class Undo {
       toggle(...of);
       const after = [...strips.pinned],
         one = [...before, ...after].find((strip) => !(before.includes(strip) && after.includes(strip)));
-      if (!one) return;
+      if (!one || one.id[0] === 'm') return; // measures are the run's
       const restore = (/** @type {typeof before} */ pinned) => () => {
         strips.pinned = [...pinned];
         strips.use();
