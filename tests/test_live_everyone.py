@@ -160,7 +160,7 @@ def test_the_outline_reads_names_and_values_of_what_is_held_and_its_inputs_and_o
             step = await pause(opened)
             await opened.key("o")
             await opened.until(
-                f"{ROWS}.length == {2 + len(compiled.network.neurons) + len(compiled.network.connections)}"
+                f"{ROWS}.length == {3 + len(compiled.network.neurons) + len(compiled.network.connections)}"
             )
             await opened.until(f"{NAMES}.slice(0, 3).join() == 'kernels,rhythm,C1'")
             for _ in range(2):

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from live_window import area_of
 from test_live_browser import pause, shown
 from test_live_looking import TIP, places, told
 from test_live_server import Eyes, Live, served
@@ -217,7 +218,7 @@ def test_what_is_held_is_drawn_listed_and_counted_with_the_weights_of_now(tmp_pa
             seen = view_of(compiled, compiled.gains)
             network, lines = compiled.network, seen.plan.lines
             ends, names = network.connections, network.neurons.names
-            at = places(compiled)
+            at, within = places(compiled), area_of(seen).at
 
             await opened.click(*at["B3"])
             await told(opened, "B3")
@@ -232,8 +233,8 @@ def test_what_is_held_is_drawn_listed_and_counted_with_the_weights_of_now(tmp_pa
             groups = asked(seen, f"n{names.index('B3')}")["groups"]
             assert {int(group["id"][1:]) for group in groups} == set(hidden)
             for group in groups:
-                a, b, c, d = np.reshape(group["shapes"][0]["points"][:8], (4, 2)) * seen.plan.frame.density
-                x, y = np.rint((a + 3 * b + 3 * c + d) / 8).astype(int)
+                a, b, c, d = np.reshape(group["shapes"][0]["points"][:8], (4, 2))
+                x, y = np.rint(within(*(a + 3 * b + 3 * c + d) / 8)).astype(int)
                 assert pixels[y - 2 : y + 3, x - 2 : x + 3].min() < 180, "the line is there, and all else recedes"
             # the outline has the same, each with its weight of this step
             await opened.key("o")

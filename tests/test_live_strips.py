@@ -363,7 +363,7 @@ def test_states_and_signals_are_chosen_and_pinned(tmp_path: Path) -> None:
                 values = made[f"(A -> B).{name}"]
                 await opened.until(f"{TRACE.format(place)}?.startsWith('A → B, {name} from step 0 to {step}')")
                 await opened.until(f"Math.abs({now.format(place)} - {values[step]}) < 1e-5")
-                assert await drawn(opened, place)
+                await opened.until(INK.format(f"document.querySelectorAll('.trace')[{place}]"))
                 for number in (values.min(), values.max()):
                     assert f"{number:.6g}".replace("-", "−") in str(await opened.ask(TRACE.format(place)))
             await opened.key("Escape")
@@ -389,6 +389,7 @@ connections: {K -> Q: 1}
 
     async def main() -> None:
         async with shown(str(tmp_path / "fires.yaml"), tmp_path) as (opened, compiled, _):
+            await opened.size(1000, 1000)  # curves stand below, as wide as the window
             await opened.until(f"{STEP} > 100")
             step = await pause(opened)
             await opened.key("]")
@@ -432,6 +433,7 @@ neurons: {K: {model: cell, bias: 1.5}}
 
     async def main() -> None:
         async with shown(str(tmp_path / "fires.yaml"), tmp_path) as (opened, _, _):
+            await opened.size(1000, 1000)  # curves stand below, as wide as the window
             await opened.until(f"{STEP} > 100")
             await pause(opened)
             await opened.key("]")
@@ -509,6 +511,7 @@ def test_two_signals_share_an_axis_or_span_a_plane_and_part_again(tmp_path: Path
 
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await opened.size(1000, 1000)  # curves stand below, as wide as the window
             await opened.until(f"{STEP} > 200")
             step = await pause(opened)
             for name in ("C1", "K2", "O"):
