@@ -97,7 +97,7 @@ async def looked_at(opened: Page, spec: str, folder: Path) -> None:
         await opened.until(f"{STEP} > 3")
         await pause(opened)
         (folder / f"{compiled.name}.png").write_bytes(await opened.shot())
-        assert await share(opened, view) >= 0.43 * 1280 * 800
+        assert await share(opened, view) >= 0.45 * 1280 * 800
         assert await opened.ask("titled.textContent") == compiled.network.title
         assert str(await opened.ask("caption.textContent")).startswith("step ")
         picture, past = await box(opened, "#picture"), await box(opened, "#past")

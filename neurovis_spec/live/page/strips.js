@@ -36,7 +36,8 @@ export const PINS = 8;
 /** The most that is drawn at once: what joined curves are besides is left out. */
 const TRACED = 24,
   MARK = 6,
-  HIGH = 48,
+  HIGH = 72,
+  LOW = 450,
   SHARE = 0.3,
   PALE = 0.3,
   FAINT = 0.5,
@@ -202,7 +203,7 @@ export class Strips {
   }
 
   /** Pin the strips that a page begins with, as far as there is room for them, or so many. @param {Curve[]} curves @param {number} [most] */
-  begin(curves, most = Math.max(1, Math.floor((SHARE * innerHeight) / HIGH) - 1)) {
+  begin(curves, most = Math.max(innerHeight < LOW ? 1 : 2, Math.floor((SHARE * innerHeight) / HIGH) - 1)) {
     for (const { items, names } of curves.slice(0, most)) {
       const [id, what] = items[0].split('.'),
         strip = this.strip();
