@@ -109,7 +109,7 @@ def test_a_page_begins_with_the_output_its_target_and_the_error(tmp_path: Path) 
             assert [name for name, _ in told] == ["O", "T", "T - O"]
             for (_, value), of in zip(told, (run["O"], run["T"], error), strict=True):
                 first = float(value.split(" … ")[0])
-                assert min(abs(of[step - 3 : step + 4] - first)) < 0.03
+                assert min(abs(of[step - 3 : step + 4] - first)) < 0.02
             await opened.point(left, 10)
             assert await opened.ask("document.querySelector('#under').hidden")
 
