@@ -92,7 +92,6 @@ class NamedProblem:
         def members(of: Iterable[str]) -> tuple[int, ...]:
             return tuple(sorted({index[name] for name in of}))
 
-        pins = sorted((index[name], (float(x), float(y))) for name, (x, y) in self.pins.items())
         boxes = _merged((name, members(of)) for name, of in self.boxes)
         free = LayoutProblem(
             network=self.network,
@@ -102,7 +101,7 @@ class NamedProblem:
                 for name, of in sorted(self.groups, key=lambda group: natural_key(group[0]))
             ),
             edges=self._edges(index),
-            pins=dict(pins),
+            pins=dict(sorted((index[name], (float(x), float(y))) for name, (x, y) in self.pins.items())),
             direction=self.direction,
             arrange=tuple(sorted((tuple(index[member] for member in of), how) for of, how in self.arrange)),
             boxes=tuple(sorted(boxes, key=lambda box: natural_key(box[0]))),

@@ -96,7 +96,7 @@ class History(Protocol):
 
 def _ranges(steps: IntArray, values: FloatArray | Range, bins: Bins) -> Range:
     """The least and the largest of the values at ascending steps in each bin."""
-    result = np.full((bins.count, 2), np.nan, np.float32)
+    result = _unknown(bins)
     edges = np.searchsorted(steps, bins.first + bins.every * np.arange(bins.count + 1))
     there = edges[1:] > edges[:-1]
     if there.any():

@@ -351,9 +351,9 @@ class SimulatedSource:
         if entry is None:
             raise SourceError("what was turned is no part of this branch")
         is_later = entry.since is not None or entry.step < self.step or self._past.before(entry.step) is None
-        if is_later and entry.back is not None and not is_finite(entry.back):
-            raise SourceError("what was before is not one finite number: go back to where it was turned")
         if is_later and entry.back is not None:
+            if not is_finite(entry.back):
+                raise SourceError("what was before is not one finite number: go back to where it was turned")
             self.turn(entry.back)
             return
         self._check_going()
