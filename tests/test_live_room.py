@@ -116,7 +116,7 @@ async def looked_at(opened: Page, spec: str, folder: Path) -> None:
         await opened.until("picture.clientWidth == 390")
         picture, past = await box(opened, "#picture"), await box(opened, "#past")
         assert past[1] >= picture[3]
-        assert await opened.ask("document.documentElement.scrollWidth <= innerWidth")
+        await opened.until("document.documentElement.scrollWidth <= innerWidth")
         await opened.call("Page.navigate", url="about:blank")
         await opened.until("location.href == 'about:blank'")
     finally:

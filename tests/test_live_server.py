@@ -437,7 +437,8 @@ def test_each_sees_the_picture_in_a_theme_of_their_own() -> None:
             assert viewer.scene["groups"] != scene["groups"]
             assert [group["id"] for group in viewer.scene["groups"]] == [group["id"] for group in scene["groups"]]
             await owner.ask("pause")
-            await owner.until(lambda: not owner.status["playing"])
+            await owner.ask("seek", step=2)  # to which both come, wherever each was when it stood still
+            await owner.until(lambda: owner.step == 2)
             # a scene anew has nothing until its first frame
             await viewer.until(lambda: viewer.step == owner.step and bool((viewer.kinds == owner.kinds).all()))
             assert owner.scene == scene

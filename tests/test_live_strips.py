@@ -340,7 +340,7 @@ connections: {A -> B: {weight: 2, synapse: gate}}
 def test_states_and_signals_are_chosen_and_pinned(tmp_path: Path) -> None:
     spec = tmp_path / "gates.yaml"
     spec.write_text(GATES)
-    choice = "document.querySelectorAll('.what')[{0}]"
+    choice = "document.querySelectorAll('.what:not(.join)')[{0}]"
 
     async def chosen(opened: Page, place: int, name: str) -> None:
         await opened.ask(f"{choice.format(place)}.value = '{name}'; {choice.format(place)}.onchange()")
@@ -352,6 +352,8 @@ def test_states_and_signals_are_chosen_and_pinned(tmp_path: Path) -> None:
             made = compiled.run(step + 1, states="all")
             await opened.click(*places(compiled)["A -> B"])
             await told(opened, "A → B")
+            await opened.size(1000, 1000)  # curves stand below, as wide as the window
+            await opened.until("innerWidth == 1000")
             options = f"[...{choice.format(0)}.options].map((one) => one.text).join()"
             assert await opened.ask(options) == "weight,g,signal"
             assert not await opened.ask(f"{choice.format(0)}.hidden")

@@ -213,7 +213,7 @@ def test_a_click_on_a_title_closes_a_box_and_what_runs_to_it_is_added_up(tmp_pat
                 (title,) = (group.shapes[0] for group in seen.plan.front if group.id == f"title:{box}")
                 assert isinstance(title, Text)
                 left, across = title.point[0], {"start": 8, "middle": 0, "end": -8}[title.anchor]
-                x, y = (seen.plan.frame.density * value for value in (left + across, title.point[1] - 3))
+                x, y = area_of(seen).at(left + across, title.point[1] - 3)
                 names = [compiled.network.neurons.names[index] for index in seen.plan.boxes[f"box:{box}"]]
                 middles[box] = np.mean([at[name] for name in names], axis=0)
                 await opened.click(x, y)

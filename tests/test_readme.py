@@ -84,11 +84,11 @@ def test_what_is_somewhere_is_there() -> None:
     rows = [line for line in table.splitlines() if line.startswith("| ")][2:]
     assert len(rows) >= 10
     for row in rows:
-        paths = re.findall(r"`([a-z_/]+(?:\.py|/))`", row)
+        paths = re.findall(r"`([a-z_/]+(?:\.py|\.js|/))`", row)
         homes = ROOT / "neurovis_spec", ROOT / "layouts" / "neurovis_layouts"
         places = [home / path for path in paths for home in homes if (home / path).exists()]
         assert len(places) == len(paths), row
         source = "".join(place.read_text(encoding="utf-8") for place in places if place.is_file())
         assert source
-        for name in re.findall(r"`((?:\w+\.)?\w+)`", row.replace(".py`", "")):
+        for name in re.findall(r"`((?:\w+\.)?\w+)`", re.sub(r"\.(py|js)`", "", row)):
             assert name.rpartition(".")[2] in source, f"{name} in {row}"

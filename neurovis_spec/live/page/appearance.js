@@ -48,11 +48,7 @@ export class Appearance {
     this.isDark = matchMedia('(prefers-color-scheme: dark)');
     const ask = (/** @type {object} */ more) => link.ask('draw', { ...this.shown, ...more });
     this.ask = ask;
-    theme.onchange = () => {
-      this.chosen = theme.value;
-      keep(THEME, this.chosen);
-      this.dress();
-    };
+    theme.onchange = () => this.choose(theme.value);
     this.isDark.onchange = () => this.dress();
     this.sliders = new Sliders(place);
     for (const [name, description] of Object.entries(GAINS)) {
@@ -60,6 +56,14 @@ export class Appearance {
         ask({ [name]: value ?? 1 }),
       );
     }
+  }
+
+  /** Have a theme from now on, '' for that of the spec. @param {string} name */
+  choose(name) {
+    this.chosen = name;
+    this.theme.value = name;
+    keep(THEME, name);
+    this.dress();
   }
 
   /** Ask for the picture in the theme that was chosen, or as dark as the system where nobody asks for one. */

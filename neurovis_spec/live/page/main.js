@@ -394,6 +394,7 @@ undo.follow(turning, 'the panel for turning');
 undo.follow(outline, 'the outline');
 undo.follow(body, 'the panel of the body');
 undo.followPins(strips);
+undo.followTheme(turning.appearance);
 part('shut').onclick = help;
 arrangePanels();
 greet(part('hint'));

@@ -212,6 +212,16 @@ export class Undo {
     };
   }
 
+  /** Have the theme that is chosen be an act. @param {import('./appearance.js').Appearance} appearance */
+  followTheme(appearance) {
+    const choose = appearance.choose.bind(appearance);
+    appearance.choose = (name) => {
+      const before = appearance.chosen;
+      choose(name);
+      this.act({ words: `theme ${name || 'of the spec'}`, undo: () => choose(before), redo: () => choose(name) });
+    };
+  }
+
   /** Have strips that are pinned or unpinned be acts. @param {import('./strips.js').Strips} strips */
   followPins(strips) {
     const toggle = strips.toggle.bind(strips);
