@@ -73,10 +73,11 @@ class Page:
         raise AssertionError(f"never: {script}; {self.errors}")
 
     async def size(self, width: int, height: int, density: float = 1.0) -> None:
-        """Have the window so large."""
+        """Have the window so large, and what stands in it arranged."""
         await self.call(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=density, mobile=False
         )
+        await self.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(0))))")
 
     async def key(self, name: str) -> None:
         """Press a key."""
