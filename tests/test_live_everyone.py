@@ -75,10 +75,13 @@ def test_axe_finds_nothing_whatever_is_open(theme: str, tmp_path: Path) -> None:
             assert await violations(opened) == [], "turning"
             await opened.ask("document.querySelector('#back').click()")
             await opened.ask("document.querySelector('#mend').click()")
-            await opened.until("document.querySelectorAll('#others button').length == 4")
+            await opened.until("document.querySelectorAll('#others button').length == 5")
             await opened.ask("document.querySelectorAll('#others button')[1].click()")
             await opened.ask("document.querySelectorAll('#others button')[2].click()")
-            assert await violations(opened) == [], "a branch is compared and named"
+            await opened.until("document.body.classList.contains('compared')")
+            await opened.ask("document.querySelectorAll('#others button')[3].click()")
+            assert await violations(opened) == [], "a branch is compared, shown beside and named"
+            await opened.ask("document.querySelector('#alone').click()")
             await opened.key("Escape")
             await opened.ask("document.querySelector('#picture').focus()")
             await opened.key("/")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import neurovis_spec as nv
@@ -176,6 +176,7 @@ def test_nothing_is_kept_where_nothing_came_after_and_none_is_gone_to_that_there
     ),
     st.sampled_from([Hold("A2", 0.3), Lesion("A1"), Weigh("A1 -> B", 0.2), Learn("A -> B", False), Set({"pull": 0.7})]),
 )
+@example([("go", 0), ("branch", 0)], Hold("A2", 0.3))
 @settings(max_examples=40, deadline=None)
 def test_every_future_is_as_it_was_left_and_what_is_undone_leaves_none(acts: list[tuple[str, int]], what: Turn) -> None:
     source, left = at(40), dict[int, list[object]]()
@@ -199,6 +200,10 @@ def test_every_future_is_as_it_was_left_and_what_is_undone_leaves_none(acts: lis
             source.restart()
         elif source.futures.all:
             chosen = source.futures.all[number % len(source.futures.all)].number
+            twin = source.twin(chosen)
+            for step in (twin.reach.last, twin.reach.last // 3):
+                assert seen_at(twin, step) == left[chosen][step], "it goes there beside the run"
+            assert everything(source) == now, "of which nothing changes"
             source.switch(chosen)
             assert everything(source) == left[chosen]
         if now is not None and source.futures.made > made:
@@ -235,6 +240,9 @@ def test_a_future_that_begins_later_than_the_run_stays_so(edited: bool) -> None:
     steps = (first, (first + end) // 2, end)
     was = [seen_at(source, step) for step in steps]
     source.restart()
+    twin = source.twin(source.futures.all[-1].number)
+    assert twin.reach == Reach(first, end)
+    assert [seen_at(twin, step) for step in steps] == was
     source.switch(source.futures.all[-1].number)
     assert source.reach == Reach(first, end)
     assert [seen_at(source, step) for step in steps] == was

@@ -213,13 +213,14 @@ def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp
             assert value == pytest.approx(run["O"][here], rel=1e-5)
             buttons = "[...document.querySelectorAll('#others button')]"
             labels = f"{buttons}.map((one) => one.ariaLabel ?? '')"
-            await opened.ask(f"{buttons}[2].click()")
+            await side_by_side(opened, buttons)
+            await opened.ask(f"{buttons}[3].click()")
             await opened.call("Input.insertText", text="without K3")
             await opened.key("Enter")
             await opened.until(f"{buttons}[0]?.textContent == 'without K3, {words}'")
             assert await opened.ask(labels) == [
                 "",
-                *(f"{one} without K3" for one in ("compare with", "rename", "delete")),
+                *(f"{one} without K3" for one in ("compare with", "A | B with", "rename", "delete")),
             ]
             await opened.ask(f"{buttons}[1].click()")
             await opened.until(f"{TRACE.format(0)}.includes(', behind it without K3')")
@@ -229,7 +230,7 @@ def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp
             await opened.point(*at)
             await opened.until("document.querySelector('#under').textContent.includes('  (without K3 ')")
             (tmp_path / "branches.png").write_bytes(await opened.shot())
-            await opened.ask(f"{buttons}[3].click()")
+            await opened.ask(f"{buttons}[4].click()")
             await opened.until("document.querySelector('#futures').hidden")
             assert await opened.ask("document.querySelector('#did').textContent") == "deleted without K3"
             for kind in ("rawKeyDown", "keyUp"):
@@ -237,6 +238,40 @@ def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp
             await opened.until(f"{buttons}[0]?.textContent == 'without K3, {words}'")
 
     asyncio.run(main())
+
+
+async def side_by_side(opened: Page, buttons: str) -> None:
+    """Another branch is shown beside the run (A | B) at the same step, with what is held; when both change places their
+    pictures are the same to the pixel, as they are before they part."""
+    pictures = "[picture, other].map((one) => one.toDataURL())"
+    frames = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    two = "document.body.classList.contains('compared') && other.width == picture.width"
+
+    async def seen() -> list[object]:
+        await opened.ask(frames)
+        found = await opened.ask(pictures)
+        assert isinstance(found, list)
+        return found
+
+    await opened.ask(f"{buttons}[2].click()")
+    await opened.until(two)
+    await opened.ask(f"{SCRUB}.value = 250; {SCRUB}.dispatchEvent(new Event('input'))")
+    await opened.until(f"{STEP} == 250 && other.ariaLabel.includes('step 250')")
+    run, branch = await seen()
+    assert run != branch
+    await opened.ask(f"{SCRUB}.value = 120; {SCRUB}.dispatchEvent(new Event('input'))")
+    await opened.until(f"{STEP} == 120 && other.ariaLabel.includes('step 120')")
+    before = await seen()
+    assert before[0] == before[1]
+    await opened.ask(f"{SCRUB}.value = 250; {SCRUB}.dispatchEvent(new Event('input'))")
+    await opened.until(f"{STEP} == 250")
+    await opened.ask(f"{buttons}[0].click()")
+    await opened.until("!document.body.classList.contains('compared')")
+    await opened.ask(f"{buttons}[2].click()")
+    await opened.until(f"{two} && other.ariaLabel.includes('step 250')")
+    assert await seen() == [branch, run]
+    await opened.ask(f"{buttons}[0].click()")
+    await opened.until("!document.body.classList.contains('compared')")
 
 
 def test_a_branch_goes_on_from_the_step_that_is_shown(tmp_path: Path) -> None:

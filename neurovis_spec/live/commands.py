@@ -101,6 +101,13 @@ class Switch:
 
 
 @dataclass(frozen=True, slots=True)
+class Compare:
+    """Show another future beside what is shown, by its number, at the same step; −1: no more."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
 class Rename:
     """Give another future a name, by its number."""
 
@@ -173,7 +180,7 @@ class Draw:
     appearance: Appearance
 
 
-Branching: TypeAlias = Branch | Switch | Rename | Forget | Restore | Undo
+Branching: TypeAlias = Branch | Switch | Compare | Rename | Forget | Restore | Undo
 Showing: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Restart | Speed
 Command: TypeAlias = Showing | Branching | Loop | Unloop | Measure | Unmeasure | Turn
 

@@ -35,7 +35,7 @@ class Future:
     """Behind step ``at`` it goes on to step ``last``, with all that was ``turned`` until then, by the states ``kept``;
     ``history`` is that of its steps alone. ``within`` are the futures that branch off from it. Its run ``started`` at a
     step. It is asked for by its ``number``, and has a ``name`` where somebody gave it one. One of an ``older`` spec
-    cannot be gone to."""
+    cannot be gone to. ``by_turn`` it was left by a turn, and without that the run goes on in it."""
 
     number: int
     at: int
@@ -47,6 +47,7 @@ class Future:
     within: tuple[Future, ...] = ()
     name: str = ""
     older: bool = False
+    by_turn: bool = False
 
     @property
     def size(self) -> int:
@@ -80,12 +81,12 @@ class Futures:
         return replace(self, all=rest, made=self.made + 1, deleted=None)
 
     def left_at(self, at: int, turned: Sequence[Turned]) -> Future | None:
-        """The one that was left last behind a step until which it was ``turned`` in this way."""
+        """The one that was left last by a turn, behind a step until which it was ``turned`` in this way."""
         wanted = [(entry.number, entry.turn) for entry in turned]  # one in place of another has its number
         found = [
             one
             for one in self.all
-            if one.at == at and not one.older
+            if one.at == at and one.by_turn and not one.older
             if [(entry.number, entry.turn) for entry in one.turned if entry.step <= at] == wanted
         ]
         return max(found, key=lambda one: one.number, default=None)

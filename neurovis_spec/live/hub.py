@@ -23,6 +23,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.live.aside import Compared
 from neurovis_spec.live.commands import Fetch, Measure, Request
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.held import told_of
@@ -39,6 +40,7 @@ from neurovis_spec.live.protocol import (
     Themed,
     Trace,
     acknowledged,
+    aside_message,
     body_message,
     command_of,
     frame_message,
@@ -130,6 +132,8 @@ class Hub:
         #: the same of bundles
         self._summed_at: npt.NDArray[np.int64] = np.zeros(0, np.int64)
         self._frames: dict[int, bytes] = {}
+        #: of the branch that is shown beside the run what it is, and what is sent of it
+        self._aside_frame: tuple[Compared | None, tuple[bytes, ...]] = None, ()
         #: when viewers are sent the next frame, and what will do so where there is one
         self._next = 0.0
         self._timer: asyncio.TimerHandle | None = None
@@ -262,6 +266,8 @@ class Hub:
             client.tell(joined_message(client.joined.content, self._version))
             for message in self._added(client, client.joined, shown):
                 client.tell(message)
+            for message in self._aside(client, shown):
+                client.tell(message)
 
     def _added(self, client: Client, joined: Joined, shown: Shown) -> Iterator[bytes]:
         """What runs from and to the boxes that a client has closed adds up to, where that has changed."""
@@ -335,6 +341,7 @@ class Hub:
             if client.joined is not None:
                 yield from self._added(client, client.joined, shown)
             yield self._frame(since)
+            yield from self._aside(client, shown)
             client.asked = bool(client.items)
         if client.asked:
             client.asked = False
@@ -342,6 +349,22 @@ class Hub:
         if client.traces:
             traces, client.traces = client.traces, ()
             yield from traces
+
+    def _aside(self, client: Client, shown: Shown) -> Iterator[bytes]:
+        """All of the branch that is shown beside the run, of which nothing is kept between frames."""
+        compared = shown.compared
+        if compared is None:
+            return
+        if self._aside_frame[0] is not compared:
+            all_items = np.arange(len(compared.glance.kinds))
+            frame = frame_message(compared.glance, compared.reach, self._version, self._serial, all_items)
+            sums = compared.glance.sums
+            more = [sums_message(sums, self._version, np.arange(len(sums)))] if len(sums) else []
+            self._aside_frame = compared, tuple(aside_message(one) for one in (*more, frame))
+        if client.joined is not None:
+            added = shown.view.added(compared.seen, client.joined.sums)
+            yield aside_message(sums_message(added, self._version, np.arange(len(added)), ADDED))
+        yield from self._aside_frame[1]
 
     def dress(self, client: Client, wants: Themed) -> None:
         """A client wants its picture in a theme."""

@@ -29,6 +29,7 @@ from neurovis_spec.live.commands import (
     Appearance,
     Branch,
     Command,
+    Compare,
     Draw,
     Event,
     Fetch,
@@ -69,9 +70,11 @@ from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
-SCENE, FRAME, TRACE, FILE, RASTER, LEFT, HELD, SUMS, JOINED, ADDED, PAIRS = range(1, 12)
+SCENE, FRAME, TRACE, FILE, RASTER, LEFT, HELD, SUMS, JOINED, ADDED, PAIRS, ASIDE = range(1, 13)
 #: kind, scene
 _SCENE_HEAD = struct.Struct("<BxH")
+#: kind
+_ASIDE_HEAD = struct.Struct("<B3x")
 #: kind, scene, how many bundles
 _SUMS_HEAD = struct.Struct("<BxHI")
 #: kind, scene, serial, changed, step, first, last, bytes of the caption, numbers of the pose
@@ -154,6 +157,11 @@ def frame_message(glance: Glance, reach: Reach, version: int, serial: int, chang
     return b"".join(parts)
 
 
+def aside_message(message: bytes) -> bytes:
+    """A frame, or what is added up, of the branch that is shown beside the run."""
+    return _ASIDE_HEAD.pack(ASIDE) + message
+
+
 def status_message(status: Status, owner: bool, takes: frozenset[str] = frozenset()) -> str:
     """How the run stands. ``takes`` are the messages that are taken besides those that its source takes."""
     able = status.capabilities
@@ -176,6 +184,7 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         futures=[_future(one) for one in status.futures.all],
         dropped=status.futures.dropped,
         branch=status.branch,
+        compared=status.compared,
     )
 
 
@@ -567,6 +576,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "branch": ({}, Branch),
     "switch": ({"number": _whole(0, _MOST)}, Switch),
     "theme": ({"name": _theme, "dark": _truth}, Themed),
+    "compare": ({"number": _whole(-1, _MOST)}, Compare),
     "rename": ({"number": _whole(0, _MOST), "name": _called}, Rename),
     "forget": ({"number": _whole(0, _MOST)}, Forget),
     "restore": ({}, Restore),

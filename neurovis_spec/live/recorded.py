@@ -17,7 +17,7 @@ from neurovis_spec.compiler.program import SPIKE
 from neurovis_spec.live.beside import Beside
 from neurovis_spec.live.futures import Futures
 from neurovis_spec.live.history import Recorded
-from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, drawn, recalled
+from neurovis_spec.live.source import Capabilities, Reach, Seen, Source, SourceError, drawn, recalled
 from neurovis_spec.live.turns import Turn, Turned
 from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.controls import Controls
@@ -190,6 +190,10 @@ class RecordedSource:
         raise SourceError("a recording cannot go on differently: run the spec")
 
     def switch(self, number: int) -> None:
+        """Raises SourceError: there is no other future."""
+        raise SourceError("a recording has no other future: run the spec")
+
+    def twin(self, number: int) -> Source:
         """Raises SourceError: there is no other future."""
         raise SourceError("a recording has no other future: run the spec")
 

@@ -20,12 +20,14 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import SpecError
+from neurovis_spec.live.aside import Aside, Compared
 from neurovis_spec.live.clock import FRAMES, Clock, Pace
 from neurovis_spec.live.commands import (
     Appearance,
     Branch,
     Branching,
     Command,
+    Compare,
     Draw,
     Event,
     Forget,
@@ -66,7 +68,8 @@ class Status:
     at which the spec has some; ``backend``, what makes the steps, "" where that is not known;
     ``futures``, what else the run has done behind steps of its past; ``branch``, the name of what it does, "" without
     one; ``measures``, the number and the text of each that
-    somebody has typed; ``loop``, the first and the last step of what is played over and over."""
+    somebody has typed; ``loop``, the first and the last step of what is played over and over; ``compared``, the number
+    of the future that is shown beside it."""
 
     playing: bool
     speed: float
@@ -83,6 +86,7 @@ class Status:
     branch: str
     measures: tuple[tuple[int, str], ...] = ()
     loop: tuple[int, int] | None = None
+    compared: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +102,7 @@ class Shown:
     body: Drawn
     quantities: FloatArray | None
     undefined: Undefined | None
+    compared: Compared | None = None
 
 
 Stage: TypeAlias = tuple[Source, View]
@@ -180,6 +185,8 @@ class Run:
         self._typed = Typed()
         #: the first and the last step of what is played over and over
         self._loop: tuple[int, int] | None = None
+        #: the branch that is shown beside it
+        self._aside: Aside | None = None
         self._series: tuple[Network, Typed, dict[str, Series]] | None = None
         self._thread = Thread(target=self._drive, name="live run", daemon=True)
         self.failure: Exception | None = None
@@ -290,7 +297,7 @@ class Run:
             case Restart():
                 source.restart()
                 self._stand_elsewhere()
-            case Branch() | Switch() | Rename() | Forget() | Restore() | Undo():
+            case Branch() | Switch() | Compare() | Rename() | Forget() | Restore() | Undo():
                 self._branch(asked)
             case Draw():
                 self.appearance = asked.appearance
@@ -323,6 +330,8 @@ class Run:
             case Switch():
                 source.switch(asked.number)
                 self._stand_elsewhere()
+            case Compare():
+                self._aside = None if asked.number < 0 else Aside(source, asked.number)
             case Rename():
                 source.futures = _known(source, asked.number).renamed(asked.number, asked.name)
             case Forget():
@@ -491,7 +500,7 @@ class Run:
 
     def shown(self) -> Shown:
         """What is to be seen now; to be called by this thread, or before it begins."""
-        source = self._source
+        source, compared = self._source, self._compared()
         status = Status(
             playing=self._running,
             speed=self._clock.speed,
@@ -508,14 +517,26 @@ class Run:
             branch=source.name,
             measures=self._typed.told,
             loop=self._loop,
+            compared=None if compared is None else compared.number,
         )
         seen = source.seen()
         glance, reach = self._view.glance(seen), source.reach
         for history in (source.history, *source.futures.histories):
             history.follow(self._followed())
         lost = self._not_finite(glance, status.turned)
-        beside = source.body, source.quantities, lost
+        beside = source.body, source.quantities, lost, compared
         return Shown(self._view, seen, glance, reach, status, source.history, *beside)
+
+    def _compared(self) -> Compared | None:
+        """What is seen of the branch that is shown beside the run; where it is no more, or cannot go on, none is."""
+        try:
+            found = None if self._aside is None else self._aside.compared(self._source, self._view)
+        except SourceError as error:
+            found = None
+            _call(self._tell, str(error))
+        if found is None:
+            self._aside = None
+        return found
 
     def _not_finite(self, glance: Glance, turned: tuple[Turned, ...]) -> Undefined | None:
         """What is not finite at the step that is shown."""

@@ -60,7 +60,7 @@ class SimulatedSource:
     """A network that runs; it stands at the first step to be computed: step 0, or that of ``begin``, a state in which
     ``turned`` has had its effect and inputs are ``fed``. ``origin`` is where it begins anew."""
 
-    capabilities = Capabilities(TURNS | {"branch", "switch", "rename", "forget", "restore", "undo"})
+    capabilities = Capabilities(TURNS | {"branch", "switch", "rename", "compare", "forget", "restore", "undo"})
 
     def __init__(
         self,
@@ -275,20 +275,21 @@ class SimulatedSource:
         """All that it has done, as another future of a run that begins anew."""
         return self._left(-1).bounded() if self._last > 0 else self.futures
 
-    def _left(self, at: int) -> Futures:
+    def _left(self, at: int, by_turn: bool = False) -> Futures:
         """The futures with what came after this step among them, if anything did that can be gone to."""
         if self._last <= at or not len(self._past):
             return self.futures
         kept, history = self._past.after(at), self.history.after(at)
         turned = tuple(self._turned)
-        return self.futures.leave(Future(0, at, self._last, self._started, turned, kept, history, name=self.name))
+        left = Future(0, at, self._last, self._started, turned, kept, history, name=self.name, by_turn=by_turn)
+        return self.futures.leave(left)
 
     def switch(self, number: int) -> None:
         """Go to another future, to the step that is shown, or to its last. Raises SourceError, also where the body
         cannot do again what it has done."""
         path, step = self.futures.path(number), self.step
         if not path:
-            raise SourceError("this future is no longer kept")
+            raise SourceError("this branch is no longer kept")
         if path[-1].older:
             raise SourceError("this branch is of an older spec: its curves can be shown, but it cannot go on")
         self._check_going()
@@ -296,6 +297,16 @@ class SimulatedSource:
             self._past, self.history = self._past.copy(), self.history.copy()
             for future in path:
                 self._take_up(future, step)
+
+    def twin(self, number: int) -> SimulatedSource:
+        """Another run of the same network, which is in a future, by its number, at the step that is shown or at its
+        last, and goes by itself; what it goes through is noted here no more. Raises SourceError."""
+        made = SimulatedSource(Simulation(self.network, self.backend), origin=self._origin)
+        made._past, made.futures, made._seen = self._past.copy(), self.futures, self._seen
+        made._turned, made._started, made._last = list(self._turned), self._started, self._last
+        made._fed, made._taken = dict(self._fed), self._taken
+        made.switch(number)
+        return made
 
     def _take_up(self, future: Future, step: int) -> None:
         """Go on as in a future that branches off from the run as it goes."""
@@ -314,8 +325,11 @@ class SimulatedSource:
 
     def branch(self) -> None:
         """Have the run go on differently from here; what came after is another future."""
+        self._part(by_turn=False)
+
+    def _part(self, by_turn: bool) -> None:
         before = self.futures.made
-        self.futures = self._left(self.step).bounded()
+        self.futures = self._left(self.step, by_turn).bounded()
         if self.futures.made > before:
             self.name = ""
         self._past.cut(self._simulation.k)
@@ -332,7 +346,7 @@ class SimulatedSource:
             refused = self._turn(what)
             if not refused:
                 kept = self._kept()
-                self.branch()
+                self._part(by_turn=True)
                 self._keep(kept)
                 self._turned = taken(self._turned, Turned(self.step, what, self._taken, back))
                 self._taken += 1

@@ -192,6 +192,10 @@ class Source(Protocol):
         """Go to another future, by its number; the one that is left is another then. Raises SourceError."""
         ...
 
+    def twin(self, number: int) -> Source:
+        """Another source, which is in a future, by its number, and goes by itself. Raises SourceError."""
+        ...
+
 
 def recalled(source: Source, steps: int) -> list[Seen]:
     """``Source.recall`` for sources that can go back and then advance step by step."""

@@ -20,7 +20,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.clock import FRAMES
 from neurovis_spec.live.futures import Futures
 from neurovis_spec.live.history import Ring
-from neurovis_spec.live.source import NOTHING, Capabilities, Mask, Reach, Seen, SourceError
+from neurovis_spec.live.source import NOTHING, Capabilities, Mask, Reach, Seen, Source, SourceError
 from neurovis_spec.live.turns import Turn, Turned, opposite, taken
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.rows import After
@@ -311,6 +311,10 @@ class ReceivedSource:
         raise SourceError("what arrives goes on by itself")
 
     def switch(self, number: int) -> None:
+        """Raises SourceError: there is no other future."""
+        raise SourceError("what arrives goes on by itself")
+
+    def twin(self, number: int) -> Source:
         """Raises SourceError: there is no other future."""
         raise SourceError("what arrives goes on by itself")
 

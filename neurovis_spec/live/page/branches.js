@@ -24,12 +24,14 @@ export class Branches {
     this.owner = false;
     /** how many were forgotten, −1 where that is not known yet */
     this.dropped = -1;
+    /** the one that is shown beside the run @type {number | null} */
+    this.compared = null;
     /** the one that is being named */
     this.naming = -1;
   }
 
   /** @param {Status} status */
-  status({ futures, dropped, branch, owner }) {
+  status({ futures, dropped, branch, owner, compared }) {
     if (this.dropped >= 0 && dropped > this.dropped)
       this.undo.tell('the oldest branch was forgotten: there is room for 16, in 128 MiB');
     this.dropped = dropped;
@@ -37,7 +39,8 @@ export class Branches {
     this.find('futures').hidden = !futures.length;
     this.find('current').hidden = !branch;
     this.find('current').textContent = branch ? `this one: ${branch}` : '';
-    const key = JSON.stringify([futures, owner]);
+    this.compared = compared;
+    const key = JSON.stringify([futures, owner, compared]);
     if (key === this.shown || (this.naming >= 0 && this.all(futures).some(({ number }) => number === this.naming)))
       return;
     this.shown = key;
@@ -88,6 +91,17 @@ export class Branches {
       ? 'its curves can be shown beside; it cannot go on, as the spec is another one'
       : 'go there, to the same step';
     go.disabled = !this.owner && !older;
+    const beside = this.button('A | B', `A | B with ${called}`, () => {
+      const isShown = this.compared === number,
+        show = (/** @type {number} */ which) => () => this.link.ask('compare', { number: which });
+      const [now, back] = isShown ? [-1, number] : [number, this.compared ?? -1];
+      show(now)();
+      if (!isShown && this.chosen !== number) this.choose(number, called);
+      this.undo.act({ words: isShown ? 'A alone' : `A | B, ${called}`, undo: show(back), redo: show(now) });
+    });
+    beside.setAttribute('aria-pressed', String(this.compared === number));
+    beside.className = 'small';
+    beside.title = 'its picture beside this one, at the same step';
     const compare = this.button('compare', `compare with ${called}`, () =>
       this.choose(this.chosen === number ? null : number, called),
     );
@@ -96,6 +110,7 @@ export class Branches {
     const place = document.createElement('span');
     compare.className = 'small';
     place.append(compare);
+    if (this.owner && !older) place.append(beside);
     if (this.owner) {
       const forget = this.button('delete', `delete ${called}`, () => {
         this.link.ask('forget', { number });

@@ -2,6 +2,7 @@
  * The page: joins the link, the camera, the drawing and the controls; draws at the display's rate what is new.
  */
 
+import { Aside } from './aside.js';
 import { Attention } from './attention.js';
 import { Axis } from './axis.js';
 import { Beside, isBeside } from './beside.js';
@@ -100,6 +101,7 @@ function show() {
     marks?.draw(context, camera, look, attention.near);
     zoom.draw(context, camera, look, drawing);
   }
+  const unfinished = aside.draw(camera, zoom, attention, matrix !== null);
   attention.show(camera, look);
   outline.show(look);
   turning.weight.show(attention.values);
@@ -109,7 +111,7 @@ function show() {
   axis.show();
   strips.show();
   if (link.scene) body.show(look, link.scene);
-  if (more) redraw();
+  if (more || unfinished) redraw();
   if (fresh) {
     fresh = false;
     link.drawn();
@@ -150,6 +152,7 @@ const link = new Link({
       stays = staying(camera, zoom.scene, network);
     pointer.cancel();
     zoom.use(network);
+    aside.use(network);
     legend.use(scene);
     room.use(network, stays !== undefined);
     joining = '';
@@ -202,6 +205,9 @@ const link = new Link({
     share.made();
     download(blob, name);
   },
+  aside() {
+    redraw();
+  },
   frame() {
     fresh = true;
     redraw();
@@ -217,6 +223,7 @@ const link = new Link({
       turning.status(message);
       undo.status(message);
       branches.status(message);
+      aside.status(message);
       placing.status(message);
       range.status(message);
       strips.owner = message.owner;
@@ -266,6 +273,10 @@ const scrubber = new Scrubber(link, part, redraw);
 const range = new Range(link, scrubber, part, redraw);
 const axis = new Axis(scrubber, part);
 const strips = new Strips(link, attention, beside, scrubber, axis, part('strips'), part('under'));
+const aside = new Aside(link, part, () => {
+  room.arrange(aside.pictures);
+  redraw();
+});
 const branches = new Branches(link, part, undo, (number, name) => strips.compare(number, name));
 const measuring = new Measuring(link, strips, part);
 const body = new Body(part('embodied'), part('posed'), part('bodily'), part('spatial'), redraw);
@@ -334,6 +345,7 @@ const placing = new Placing(
   () => !matrix && drawing !== null,
   (group) => {
     if (group) drawing?.reshape(zoom.inked(group));
+    aside.drawing = null;
     redraw();
   },
   part,

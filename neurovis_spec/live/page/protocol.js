@@ -52,7 +52,7 @@ import { isStill } from './camera.js';
  * @typedef {{number: number, at: number, last: number, turned: Turned[], within: Future[], name: string, older: boolean}} Future */
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
  *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
- *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[], dropped: number, branch: string, measures: {number: number, text: string}[], loop: number[] | null}} Status */
+ *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[], dropped: number, branch: string, compared: number | null, measures: {number: number, text: string}[], loop: number[] | null}} Status */
 /** What is not finite: the first, since which step, or an earlier one that is not known, and how many are; '' where nothing is.
  * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
@@ -65,7 +65,7 @@ import { isStill } from './camera.js';
  *   | {type: 'saving', files: string[], diff: string, written: boolean}
  *   | {type: 'measured', text: string, findings: {start: number, end: number, message: string, hint: string}[]}
  *   | {type: 'refused', reason: string}} Message */
-/** @typedef {{scene: (scene: Scene) => void, frame: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
+/** @typedef {{scene: (scene: Scene) => void, frame: () => void, aside: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
  *   left: (traces: Traces) => void, pairs: (traces: Traces) => void,
  *   raster: (raster: Raster) => void, held: (told: Told) => void, joined: (joined: Joined) => void,
  *   text: (message: Message) => void, link: (open: boolean) => void}} Listener */
@@ -84,6 +84,7 @@ const SCENE = 1,
   PAIRS = 11,
   JOINED = 9,
   ADDED = 10,
+  ASIDE = 12,
   HEAD = 40;
 
 /** Unpack what is compressed behind a head. @param {ArrayBuffer} buffer */
@@ -97,6 +98,25 @@ async function unpack(buffer) {
   const scene = await unzip(buffer);
   scene.version = new DataView(buffer).getUint16(2, true);
   return scene;
+}
+
+/** How a scene looks of which nothing has come yet. @param {Scene} scene @returns {Look} */
+function blank({ lines, discs, bundles }) {
+  return {
+    serial: 0,
+    step: 0,
+    first: 0,
+    last: 0,
+    caption: '',
+    discs: new Int8Array(discs),
+    lines: new Int8Array(lines),
+    widths: new Uint16Array(lines),
+    glows: new Uint16Array(lines),
+    kinds: new Uint8Array(lines + discs),
+    pose: new Float32Array(0),
+    added: new Float32Array(0),
+    sums: new Float32Array(NUMBERS * bundles.joined.length),
+  };
 }
 
 /** Take a frame over into a look; false where it is of another scene.
@@ -224,6 +244,8 @@ export class Link {
     this.scene = null;
     /** @type {Look | null} */
     this.look = null;
+    /** how the branch looks that is shown beside the run @type {Look | null} */
+    this.other = null;
     /** the messages that change something and are taken @type {Set<string>} */
     this.takes = new Set();
     /** @type {WebSocket | Handed | null} */
@@ -276,25 +298,13 @@ export class Link {
     }
     if (kind === SCENE) {
       this.scene = await unpack(data);
-      const { lines, discs } = this.scene;
-      this.look = {
-        serial: 0,
-        step: 0,
-        first: 0,
-        last: 0,
-        caption: '',
-        discs: new Int8Array(discs),
-        lines: new Int8Array(lines),
-        widths: new Uint16Array(lines),
-        glows: new Uint16Array(lines),
-        kinds: new Uint8Array(lines + discs),
-        pose: new Float32Array(0),
-        added: new Float32Array(0),
-        sums: new Float32Array(NUMBERS * this.scene.bundles.joined.length),
-      };
+      this.look = blank(this.scene);
+      this.other = null;
       this.listener.scene(this.scene);
     } else if (kind === FRAME && this.scene && this.look && take(data, this.scene.version, this.look)) {
       this.listener.frame();
+    } else if (kind === ASIDE) {
+      this.aside(data.slice(4));
     } else if (kind === FILE) {
       const from = 4 + new DataView(data).getUint16(2, true);
       this.listener.file(new TextDecoder().decode(data.slice(4, from)), new Blob([data.slice(from)]));
@@ -332,6 +342,19 @@ export class Link {
     } else if (kind === HELD && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.held(await unzip(data));
     }
+  }
+
+  /** Of the branch that is shown beside the run a frame has come, or what is added up. @param {ArrayBuffer} data */
+  aside(data) {
+    const { scene } = this,
+      kind = new Uint8Array(data)[0];
+    if (!scene || new DataView(data).getUint16(2, true) !== scene.version) return;
+    this.other ??= blank(scene);
+    if (kind === SUMS) takeSums(data, this.other.sums);
+    else if (kind === ADDED) {
+      this.other.added = new Float32Array(NUMBERS * new DataView(data).getUint32(4, true));
+      takeSums(data, this.other.added);
+    } else if (kind === FRAME && take(data, scene.version, this.other)) this.listener.aside();
   }
 
   /** Ask for something. @param {string} type @param {object} [more] */

@@ -102,6 +102,8 @@ export class Room {
     this.scene = null;
     /** the width of the network by its height */
     this.shape = 1;
+    /** how many pictures of it there are */
+    this.pictures = 1;
     /** @type {number[][]} */
     this.taken = [];
     new ResizeObserver(() => this.arrange()).observe(find('shown'));
@@ -120,11 +122,16 @@ export class Room {
     this.arrange();
   }
 
-  /** Put the curves beside the network, or below it. */
-  arrange() {
+  /** Put the curves beside the network, or below it; two pictures of it side by side, or one above the other, as they are
+   * larger. @param {number} [pictures] how many there are from now on */
+  arrange(pictures = this.pictures) {
+    this.pictures = pictures;
     if (!this.scene) return;
     const { clientWidth: wide, clientHeight: high } = this.find('shown'),
-      { isBeside, aside } = shared(wide, high, this.shape, !this.find('embodied').hidden);
+      isStacked = pictures > 1 && Math.min(wide / 2 / this.shape, high) < Math.min(wide / this.shape, high / 2);
+    const shape = isStacked ? this.shape / 2 : this.shape * pictures,
+      { isBeside, aside } = shared(wide, high, shape, !this.find('embodied').hidden);
+    document.body.classList.toggle('stacked', isStacked);
     document.body.classList.toggle('beside', isBeside);
     document.body.style.setProperty('--aside', `${aside}px`);
     this.place();
@@ -172,7 +179,8 @@ export class Room {
     legend.draw(room);
     const { size } = legend.flow(room),
       over = -title - 1;
-    let [x, y] = [left + wide - legend.heading.offsetWidth - GAP, over];
+    const isHalf = this.pictures > 1 && !document.body.classList.contains('stacked');
+    let [x, y] = [left + (isHalf ? 2 : 1) * wide - legend.heading.offsetWidth - GAP, over];
     if (panel.open) [x, y] = at([size[0] + 2 * GAP, size[1] + title + GAP], corner);
     panel.style.translate = `${Math.round(Math.max(0, x))}px ${Math.round(free || !panel.open ? y : top)}px`;
   }

@@ -1,0 +1,106 @@
+/**
+ * Aside: another branch of the run in a picture of its own, beside that of the run (A | B), at the same step and seen by the same
+ * camera.
+ */
+
+import { Drawing } from './draw.js';
+import { Marks } from './marks.js';
+import { Matrix } from './matrix.js';
+import { Zoom } from './zoom.js';
+
+/** @typedef {import('./camera.js').Camera} Camera */
+/** @typedef {import('./draw.js').Context} Context */
+/** @typedef {import('./protocol.js').Future} Future */
+/** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Scene} Scene */
+/** @typedef {import('./protocol.js').Status} Status */
+
+/** All of a tree. @param {Future[]} futures @returns {Future[]} */
+const every = (futures) => futures.flatMap((one) => [one, ...every(one.within)]);
+
+/** How a branch is called. @param {Future} branch @returns {string} */
+export const called = ({ name, at, last }) => name || `the branch from step ${at + 1} to ${last}`;
+
+/** The picture of another branch. */
+export class Aside {
+  /** @param {Link} link @param {(id: string) => HTMLElement} find @param {() => void} arrange has the page arranged anew */
+  constructor(link, find, arrange) {
+    this.link = link;
+    this.find = find;
+    this.arrange = arrange;
+    this.canvas = /** @type {HTMLCanvasElement} */ (find('other'));
+    this.context = /** @type {Context} */ (this.canvas.getContext('2d', { alpha: false }));
+    this.zoom = new Zoom();
+    /** @type {Drawing | null} */
+    this.drawing = null;
+    /** @type {Marks | null} */
+    this.marks = null;
+    /** @type {Matrix | null} */
+    this.matrix = null;
+    /** the branch that is shown @type {Future | null} */
+    this.branch = null;
+    find('alone').onclick = () => link.ask('compare', { number: -1 });
+  }
+
+  /** How many pictures there are. @returns {number} */
+  get pictures() {
+    return this.branch ? 2 : 1;
+  }
+
+  /** @param {Status} status */
+  status({ compared, futures, branch, owner }) {
+    const before = this.branch;
+    this.branch = every(futures).find(({ number }) => number === compared) ?? null;
+    if (!this.branch) this.link.other = null;
+    this.find('alone').hidden = !owner;
+    this.find('which').textContent = `A · ${branch || 'this run'}`;
+    if (this.branch) this.find('otherwise').textContent = `B · ${called(this.branch)}`;
+    if (!before === !this.branch) return;
+    document.body.classList.toggle('compared', this.branch !== null);
+    this.arrange();
+  }
+
+  /** Another picture of the network, or another network. @param {Scene} scene */
+  use(scene) {
+    this.zoom.use(scene);
+    this.drawing = this.matrix = null;
+  }
+
+  /** Draw it as the run is drawn; true where there is more to be drawn.
+   * @param {Camera} camera @param {Zoom} zoom of the run @param {{near: Set<string>, held: string}} attention @param {boolean} asMatrix
+   * @returns {boolean} */
+  draw(camera, zoom, attention, asMatrix) {
+    const { canvas, context, link, branch } = this,
+      look = link.other;
+    if (!branch || !look?.serial || !link.scene) return false;
+    if (canvas.width !== camera.window[0] || canvas.height !== camera.window[1])
+      [canvas.width, canvas.height] = camera.window;
+    const isBefore = link.look && link.look.step > look.step && look.step === branch.last;
+    this.find('ended').textContent = isBefore ? ` · ended at step ${look.step}` : '';
+    canvas.setAttribute('aria-label', `B, ${called(branch)}, ${look.caption || `step ${look.step}`}`);
+    if (asMatrix) {
+      this.matrix ??= new Matrix(link.scene);
+      [this.matrix.near, this.matrix.held] = [attention.near, attention.held];
+      return this.matrix.draw(context, camera, look);
+    }
+    const scene = this.seen(camera, zoom);
+    if (!scene) return false;
+    if (!this.drawing || (this.drawing.scene !== scene && !this.drawing.isPassing(camera))) {
+      this.drawing = new Drawing(scene);
+      this.marks = new Marks(scene);
+    }
+    [this.drawing.near, this.drawing.held] = [attention.near, attention.held];
+    const more = this.drawing.draw(context, camera, look);
+    this.marks?.draw(context, camera, look, attention.near);
+    this.zoom.draw(context, camera, look, this.drawing);
+    return more;
+  }
+
+  /** The scene as the run's is seen, with the same boxes closed. @param {Camera} camera @param {Zoom} zoom */
+  seen(camera, { scene, hand, joined, ids }) {
+    const own = this.zoom,
+      isSame = own.scene === scene && own.joined === joined && own.ids.join() === ids.join();
+    if (!isSame) Object.assign(own, { scene, hand, joined, made: null });
+    return own.seen(camera);
+  }
+}
