@@ -65,6 +65,10 @@ def shapes(futures: Sequence[Future]) -> Sequence[object]:
     return sorted([one.at, one.last, len(one.turned), repr(shapes(one.within))] for one in futures)
 
 
+def numbers_in(futures: Sequence[Future]) -> list[int]:
+    return [number for one in futures for number in (one.number, *numbers_in(one.within))]
+
+
 def test_what_is_taken_back_later_is_the_opposite_from_there_on_and_earlier_has_not_been() -> None:
     source = at(30)
     source.turn(Lesion("A1"))
@@ -133,9 +137,8 @@ def test_branches_of_branches_are_gone_to_through_these() -> None:
     assert (outer.number, outer.at, [(one.number, one.at) for one in outer.within]) == (2, 40, [(1, 90)])
     source.switch(1)
     assert everything(source) == second
-    numbers = {one.at: one.number for one in source.futures.all}
-    assert set(numbers) == {40, 90}
-    source.switch(numbers[90])
+    assert {one.at: one.number for one in source.futures.all} == {40: 0, 90: 2}, "each keeps its number"
+    source.switch(2)
     assert everything(source) == third
 
 
@@ -181,7 +184,7 @@ def test_nothing_is_kept_where_nothing_came_after_and_none_is_gone_to_that_there
 def test_every_future_is_as_it_was_left_and_what_is_undone_leaves_none(acts: list[tuple[str, int]], what: Turn) -> None:
     source, left = at(40), dict[int, list[object]]()
     for act, number in acts:
-        made, now = source.futures.made, None
+        made, line, now = source.futures.made, source.futures.now, None
         if act in ("turn", "undo", "branch", "restart", "switch"):
             now = everything(source)
         if act == "go":
@@ -207,8 +210,10 @@ def test_every_future_is_as_it_was_left_and_what_is_undone_leaves_none(acts: lis
             source.switch(chosen)
             assert everything(source) == left[chosen]
         if now is not None and source.futures.made > made:
-            left[made] = now
-    assert {future.number for future in source.futures.all} <= set(left)
+            left[line] = now
+    numbers = [source.futures.now, *numbers_in(source.futures.all)]
+    assert len(set(numbers)) == len(numbers), "each is asked for by its own"
+    assert set(numbers[1:]) <= set(left)
     if any(type(entry.turn) is type(what) and entry.step == source.step for entry in source.turned):
         return  # of two values at one step the last is the turn
     before = everything(source), shapes(source.futures.all)
@@ -379,7 +384,9 @@ def test_a_status_tells_them_and_a_message_goes_there() -> None:
     source.go(5)
     source.turn(Set({"pull": 0.3}))
     run = Run(source, view_of(COMPILED, COMPILED.gains), lambda shown: None, lambda: False)
-    told = json.loads(status_message(run.shown().status, True))["futures"]
+    status = json.loads(status_message(run.shown().status, True))
+    told = status["futures"]
+    assert status["current"] == 2
     assert [(one["number"], one["at"], one["last"], one["turned"]) for one in told] == [
         (1, 5, 11, [{"step": 10, "type": "lesion", "part": "A1"}])
     ]

@@ -25,6 +25,10 @@ INK = (
     "height: c.height}}).toDataURL())({0})"
 )
 #: A curve is asked for by typing it.
+JOIN = (
+    "((place, how) => {{ const menu = document.querySelectorAll('.join')[place]; "
+    "menu.value = [...menu.options].find((one) => one.text == how).value; menu.onchange(); }})({0}, '{1}')"
+)
 TYPED = "document.querySelector('#measure').value = {0}; document.querySelector('#measuring').requestSubmit()"
 MARKS = INK.format("document.querySelector('#marks')")
 
@@ -535,10 +539,6 @@ def test_a_curve_is_added_by_typing_it_and_those_who_look_on_see_it(tmp_path: Pa
 
 def test_two_signals_share_an_axis_or_span_a_plane_and_part_again(tmp_path: Path) -> None:
     """What is drawn in the plane are the values of the steps, each against that of the same step."""
-    join = (
-        "((place, how) => {{ const menu = document.querySelectorAll('.join')[place]; "
-        "menu.value = [...menu.options].find((one) => one.text == how).value; menu.onchange(); }})({0}, '{1}')"
-    )
     ink = (  # of several lists of points, how many of each have some
         "((c, lists, pixels = c.getContext('2d').getImageData(0, 0, c.width, c.height).data, "
         "there = (x, y) => pixels[4 * (Math.round(y) * c.width + Math.round(x)) + 3] > 60) => lists.map((points) => "
@@ -554,14 +554,14 @@ def test_two_signals_share_an_axis_or_span_a_plane_and_part_again(tmp_path: Path
             for name in ("C1", "K2", "O"):
                 await opened.ask(TYPED.format(f"'{name}'"))
             run = compiled.run(step + 1)
-            await opened.ask(join.format(0, "with K2"))
+            await opened.ask(JOIN.format(0, "with K2"))
             await opened.until(f"{TITLE.format(0)} == 'C1K2' && {TITLE.format(1)} == 'O'")
             await opened.until(f"{TRACE.format(0)}?.startsWith('C1 and K2 from step 0 to {step}')")
             ends = str(await opened.ask(TRACE.format(0))).replace("−", "-").partition("between ")[2].split(" and ")
             assert [float(one) for one in ends] == pytest.approx([run["C1"].min(), run["K2"].max()], rel=1e-4)
-            await opened.ask(join.format(0, "apart"))
+            await opened.ask(JOIN.format(0, "apart"))
             await opened.until(f"{TITLE.format(0)} == 'C1' && {TITLE.format(2)} == 'K2'")
-            await opened.ask(join.format(1, "against C1"))
+            await opened.ask(JOIN.format(1, "against C1"))
             await opened.until(f"{TRACE.format(1)}?.startsWith('O against C1 from step 0 to {step}')")
             height = (await numbers(opened, "document.querySelector('.plane').height"))[0]
             wide = 2 * height
@@ -573,7 +573,7 @@ def test_two_signals_share_an_axis_or_span_a_plane_and_part_again(tmp_path: Path
             assert isinstance(found, list)
             assert found[0] == len(points)
             assert found[1] < 0.7 * len(points)
-            await opened.ask(join.format(1, "over time"))
+            await opened.ask(JOIN.format(1, "over time"))
             await opened.until(f"{TRACE.format(1)}?.startsWith('O from step 0 to {step}')")
 
     asyncio.run(main())

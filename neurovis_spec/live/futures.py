@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -34,8 +35,9 @@ Steps: TypeAlias = Ring | Renamed
 class Future:
     """Behind step ``at`` it goes on to step ``last``, with all that was ``turned`` until then, by the states ``kept``;
     ``history`` is that of its steps alone. ``within`` are the futures that branch off from it. Its run ``started`` at a
-    step. It is asked for by its ``number``, and has a ``name`` where somebody gave it one. One of an ``older`` spec
-    cannot be gone to. ``by_turn`` it was left by a turn, and without that the run goes on in it."""
+    step. It is asked for by its ``number``, which stays the same, also while the run goes on in it, and has a ``name``
+    where somebody gave it one; ``place`` counts in which order they were left. One of an ``older`` spec cannot be gone
+    to. ``by_turn`` it was left by a turn, and without that the run goes on in it."""
 
     number: int
     at: int
@@ -48,6 +50,7 @@ class Future:
     name: str = ""
     older: bool = False
     by_turn: bool = False
+    place: int = 0
 
     @property
     def size(self) -> int:
@@ -60,8 +63,11 @@ class Futures:
     """Those that branch off from the run as it goes, in the order in which they were left."""
 
     all: tuple[Future, ...] = ()
-    #: how many there were
+    #: how many were left
     made: int = 0
+    #: the number of the run as it goes, and the next one that no branch has had
+    now: int = 0
+    fresh: int = 1
     #: how many of these were forgotten as there was no room
     dropped: int = 0
     #: what was deleted last, with the number of what it was within (None: of nothing), until the tree is another
@@ -70,15 +76,15 @@ class Futures:
     @property
     def left(self) -> Future | None:
         """The one that was left last."""
-        return max(self.all, key=lambda one: one.number, default=None)
+        return max(self.all, key=attrgetter("place"), default=None)
 
     def leave(self, left: Future) -> Futures:
-        """With a future that is left, as the run goes on differently behind its step ``at``: it gets the next number,
-        and what branched off from it later is within it."""
+        """With a future that is left, as the run goes on differently behind its step ``at``: it keeps the number of the
+        run, which gets a fresh one, and what branched off from it later is within it."""
         within = tuple(one for one in self.all if one.at > left.at)
-        made = replace(left, number=self.made, within=within)
+        made = replace(left, number=self.now, place=self.made, within=within)
         rest = (*(one for one in self.all if one.at <= left.at), made)
-        return replace(self, all=rest, made=self.made + 1, deleted=None)
+        return replace(self, all=rest, made=self.made + 1, now=self.fresh, fresh=self.fresh + 1, deleted=None)
 
     def left_at(self, at: int, turned: Sequence[Turned]) -> Future | None:
         """The one that was left last by a turn, behind a step until which it was ``turned`` in this way."""
@@ -89,7 +95,7 @@ class Futures:
             if one.at == at and one.by_turn and not one.older
             if [(entry.number, entry.turn) for entry in one.turned if entry.step <= at] == wanted
         ]
-        return max(found, key=lambda one: one.number, default=None)
+        return max(found, key=attrgetter("place"), default=None)
 
     def bounded(self, room: int = ROOM) -> Futures:
         """Without the oldest, where they are too many or take too much room."""
@@ -103,11 +109,11 @@ class Futures:
         """The futures that lead to one, from outside; none where there is none of this number."""
         return _path(self.all, number)
 
-    def without(self, number: int) -> Futures:
-        """Without one of these, and with what is within it."""
+    def taken_up(self, number: int) -> Futures:
+        """With the run going on as one of these, and with what is within it."""
         (taken,) = [one for one in self.all if one.number == number]
         rest = tuple(one for one in (*self.all, *taken.within) if one is not taken)
-        return replace(self, all=rest, deleted=None)
+        return replace(self, all=rest, now=number, deleted=None)
 
     def renamed(self, number: int, name: str) -> Futures:
         """With another name of one."""
@@ -166,7 +172,7 @@ def _bounded(futures: tuple[Future, ...], room: int) -> tuple[Future, ...]:
     """Without the oldest, where they are too many or take too much room; one with others within it goes with these."""
     found = _every(futures)
     while len(found) > MOST or sum(one.size for one in found) > room:
-        oldest = min(found, key=lambda one: one.number)
+        oldest = min(found, key=attrgetter("place"))
         futures = _pruned(futures, oldest.number)
         found = _every(futures)
     return futures

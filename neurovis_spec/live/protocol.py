@@ -183,6 +183,7 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         measures=[{"number": number, "text": text} for number, text in status.measures],
         futures=[_future(one) for one in status.futures.all],
         dropped=status.futures.dropped,
+        current=status.futures.now,
         branch=status.branch,
         compared=status.compared,
     )

@@ -401,7 +401,7 @@ class SimulatedSource:
     def _go_on(self, future: Future) -> None:
         """Have the states, the turns and the history of a future follow those of the run until where it branched
         off."""
-        self.futures = self.futures.without(future.number)
+        self.futures = self.futures.taken_up(future.number)
         for kept in future.kept:
             self._past.keep(kept)
         assert isinstance(future.history, Ring)

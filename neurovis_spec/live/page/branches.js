@@ -22,6 +22,10 @@ export class Branches {
     this.chosen = null;
     this.shown = '';
     this.owner = false;
+    /** the number of the one that the run is in, and the others */
+    this.current = 0;
+    /** @type {Future[]} */
+    this.futures = [];
     /** how many were forgotten, −1 where that is not known yet */
     this.dropped = -1;
     /** the one that is shown beside the run @type {number | null} */
@@ -31,7 +35,8 @@ export class Branches {
   }
 
   /** @param {Status} status */
-  status({ futures, dropped, branch, owner, compared }) {
+  status({ futures, dropped, current, branch, owner, compared }) {
+    [this.current, this.futures] = [current, futures];
     if (this.dropped >= 0 && dropped > this.dropped)
       this.undo.tell('the oldest branch was forgotten: there is room for 16, in 128 MiB');
     this.dropped = dropped;
@@ -46,6 +51,24 @@ export class Branches {
     this.shown = key;
     if (this.chosen !== null && !this.all(futures).some(({ number }) => number === this.chosen)) this.choose(null, '');
     this.list(futures);
+  }
+
+  /** Whether there are others. */
+  get isSeveral() {
+    return this.futures.length > 0;
+  }
+
+  /** Go to the branch of a link; '' where the run is there then, else why it is not. @param {number} wanted @returns {string} */
+  go(wanted) {
+    if (wanted === this.current) return '';
+    const known = this.all(this.futures).find(({ number }) => number === wanted);
+    if (!known) return 'the branch of this link is no more: what the run does now is shown instead';
+    if (known.older)
+      return 'the branch of this link is of an older spec: its curves can be compared, but it cannot go on';
+    if (!this.owner)
+      return 'this link is of another branch: only the owner can go there, and this page shows where the run is';
+    this.link.ask('switch', { number: wanted });
+    return '';
   }
 
   /** All of a tree. @param {Future[]} futures @returns {Future[]} */

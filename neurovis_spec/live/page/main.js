@@ -218,7 +218,6 @@ const link = new Link({
       const asking = /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('[data-asks]'));
       for (const one of asking) one.hidden = !link.takes.has(one.dataset.asks ?? '');
       controls.status(message);
-      share.status();
       scrubber.status(message);
       turning.status(message);
       undo.status(message);
@@ -228,6 +227,7 @@ const link = new Link({
       range.status(message);
       strips.owner = message.owner;
       strips.measures(message.measures);
+      share.status();
     } else if (message.type === 'values') attention.take(message);
     else if (message.type === 'body') body.use(message.skeleton, message.start);
     else if (message.type === 'findings') controls.found(message);
@@ -280,7 +280,9 @@ const aside = new Aside(link, part, () => {
 const branches = new Branches(link, part, undo, (number, name) => strips.compare(number, name));
 const measuring = new Measuring(link, strips, part);
 const body = new Body(part('embodied'), part('posed'), part('bodily'), part('spatial'), redraw);
-const share = new Share(link, camera, strips, attention, controls, body, redraw, part);
+const share = new Share(link, camera, strips, attention, controls, body, redraw, part, branches, (words) =>
+  refusal.tell(words),
+);
 
 /** Show the matrix in place of the picture, or the picture. @param {boolean} asMatrix */
 function choose(asMatrix) {

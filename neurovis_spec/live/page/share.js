@@ -7,6 +7,7 @@ import { PINS } from './strips.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./body.js').Body} Body */
+/** @typedef {import('./branches.js').Branches} Branches */
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {import('./controls.js').Controls} Controls */
 /** @typedef {import('./protocol.js').Link} Link */
@@ -17,9 +18,12 @@ import { PINS } from './strips.js';
 /** How often the address is brought up to date, in milliseconds; how long it is told that something was copied. */
 const PACE = 500,
   TOLD = 1500;
-/** What parts an item from what of it is shown, and items in one axis: no name has them. */
+/** What parts an item from what of it is shown, and items in one strip: no name has them; and what stands before an item that
+ * is joined, and before one that it is drawn against: no name begins so. */
 const OF = '|',
-  WITH = '~';
+  WITH = '~',
+  JOINED = '+',
+  AGAINST = '/';
 
 /** A finite number of a text, null where it is none. @param {string | null | undefined} text @returns {number | null} */
 const number = (text) => (text && Number.isFinite(Number(text)) ? Number(text) : null);
@@ -27,14 +31,17 @@ const number = (text) => (text && Number.isFinite(Number(text)) ? Number(text) :
 /** What of a page a link holds. */
 export class Share {
   /** @param {Link} link @param {Camera} camera @param {Strips} strips @param {Attention} attention @param {Controls} controls
-   * @param {Body} body @param {() => void} redraw @param {(id: string) => HTMLElement} part */
-  constructor(link, camera, strips, attention, controls, body, redraw, part) {
+   * @param {Body} body @param {() => void} redraw @param {(id: string) => HTMLElement} part
+   * @param {Branches} branches @param {(words: string) => void} tell says what of a link cannot be shown */
+  constructor(link, camera, strips, attention, controls, body, redraw, part, branches, tell) {
     this.link = link;
     this.camera = camera;
     this.strips = strips;
     this.attention = attention;
     this.controls = controls;
     this.redraw = redraw;
+    this.tell = tell;
+    this.branches = branches;
     /** the curves that the page began with */
     this.begun = '';
     this.isBegun = false;
@@ -101,6 +108,13 @@ export class Share {
     if (location.protocol === 'about:') return;
     this.restore(new URLSearchParams(location.hash.slice(1)));
     setInterval(() => this.keep(), PACE);
+    // somebody has edited the address, or gone to a link of this very page
+    addEventListener('hashchange', () => {
+      const said = new URLSearchParams(location.hash.slice(1));
+      if (!said.has('view')) this.camera.fit();
+      if (!said.has('curves')) said.set('curves', this.begun);
+      this.restore(said);
+    });
   }
 
   /** The name of an item, which another network may have, too. @param {string} key @returns {string} */
@@ -117,14 +131,39 @@ export class Share {
     for (const { id, data } of this.attention.groups.values()) {
       if ((data.neuron ?? data.connection) === name) return what ? `${id}.${what}` : id;
     }
-    return /^[eis]\d+$/.test(name) && this.strips.group(name) ? name : '';
+    return /^[eims]\d+$/.test(name) && this.strips.group(name) ? name : '';
   }
 
   /** The curves that are pinned, by their names. @returns {string} */
   curves() {
     return this.strips.pinned
-      .map(({ key, behind }) => [key, ...behind].map((one) => this.named(one)).join(WITH))
+      .map(({ key, behind, joined, against }) =>
+        [
+          ...[key, ...behind].map((one) => this.named(one)),
+          ...joined.map((one) => JOINED + this.named(one.key)),
+          ...(against ? [AGAINST + this.named(against.key)] : []),
+        ].join(WITH),
+      )
       .join('\n');
+  }
+
+  /** Pin curves by their names, and nothing else. @param {string} curves */
+  pin(curves) {
+    const { strips } = this;
+    strips.pinned = [];
+    for (const line of curves.split('\n').slice(0, PINS)) {
+      const parts = line.split(WITH),
+        names = parts.filter((one) => one[0] !== JOINED && one[0] !== AGAINST),
+        beside = (/** @type {string} */ mark) =>
+          parts
+            .filter((one) => one[0] === mark)
+            .map((one) => this.item(one.slice(1)))
+            .filter(Boolean);
+      const items = names.map((name) => this.item(name));
+      if (items[0] && items.every(Boolean))
+        strips.put({ items, names: names.map((name) => name.split(OF)[0]) }, beside(JOINED), beside(AGAINST)[0]);
+    }
+    strips.list();
   }
 
   /** What an address says of this page. @returns {string} */
@@ -133,6 +172,7 @@ export class Share {
       said = new URLSearchParams(),
       curves = this.curves();
     if (!controls.playing && link.look) said.set('step', String(link.look.step));
+    if (!controls.playing || this.branches.isSeveral) said.set('branch', String(this.branches.current));
     if (controls.speed.value !== '1') said.set('speed', controls.speed.value);
     const at = camera.unit(camera.window[0] / 2, camera.window[1] / 2);
     const isWhole =
@@ -152,7 +192,7 @@ export class Share {
 
   /** Go to where an address says. @param {URLSearchParams} said */
   restore(said) {
-    const { camera, controls, link, strips } = this,
+    const { camera, controls, link } = this,
       step = number(said.get('step')),
       speed = said.get('speed'),
       curves = said.get('curves');
@@ -168,22 +208,13 @@ export class Share {
       };
       requestAnimationFrame(() => requestAnimationFrame(see));
     }
-    if (curves !== null) {
-      strips.pinned = [];
-      const wanted = curves.split('\n').map((line) => line.split(WITH));
-      strips.begin(
-        wanted
-          .map((names) => ({
-            items: names.map((name) => this.item(name)),
-            names: names.map((name) => name.split(OF)[0]),
-          }))
-          .filter(({ items }) => items[0] && items.every(Boolean)),
-        PINS,
-      );
-    }
+    if (curves !== null) this.pin(curves);
     if (controls.owner && [...controls.speed.options].some(({ value }) => value === speed))
       link.ask('speed', { value: speed });
-    if (controls.owner && step !== null && Number.isSafeInteger(step) && step >= 0) link.ask('seek', { step });
+    const branch = number(said.get('branch')),
+      missing = branch === null ? '' : this.branches.go(branch);
+    if (missing) this.tell(missing);
+    else if (controls.owner && step !== null && Number.isSafeInteger(step) && step >= 0) link.ask('seek', { step });
     this.redraw();
   }
 }

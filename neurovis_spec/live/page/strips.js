@@ -204,13 +204,27 @@ export class Strips {
 
   /** Pin the strips that a page begins with, as far as there is room for them, or so many. @param {Curve[]} curves @param {number} [most] */
   begin(curves, most = Math.max(innerHeight < LOW ? 1 : 2, Math.floor((SHARE * innerHeight) / HIGH) - 1)) {
-    for (const { items, names } of curves.slice(0, most)) {
-      const [id, what] = items[0].split('.'),
-        strip = this.strip();
-      this.pinned.push(strip);
-      this.of(strip, this.group(id), what, { items, names });
-    }
+    for (const curve of curves.slice(0, most)) this.put(curve);
     this.list();
+  }
+
+  /** Pin a curve, to be listed then, with others in its axis, or against another. @param {Curve} curve @param {string[]} [joined]
+   * by what these are asked for @param {string} [against] */
+  put({ items, names }, joined = [], against = '') {
+    const [id, what] = items[0].split('.'),
+      strip = this.strip();
+    this.pinned.push(strip);
+    strip.joined = joined.map((key) => this.taken(key));
+    strip.against = against ? this.taken(against) : null;
+    this.of(strip, this.group(id), what, { items, names });
+  }
+
+  /** What is asked for by a key, to be shown by another strip. @param {string} key @returns {Joined} */
+  taken(key) {
+    const [id, what = ''] = key.split('.'),
+      group = this.group(id),
+      called = group ? group.title.split('\n')[0] : '';
+    return { id, what, key, name: what ? `${called}.${what}` : called, data: JSON.stringify(group?.data) };
   }
 
   /** Say what all strips show below the pointer. @param {number | null} x pixels across a strip, null where it is on none */
