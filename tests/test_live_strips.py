@@ -217,6 +217,10 @@ def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp
             assert value == pytest.approx(run["O"][here], rel=1e-5)
             buttons = "[...document.querySelectorAll('#others button')]"
             labels = f"{buttons}.map((one) => one.ariaLabel ?? '')"
+            await opened.ask("document.querySelector('#current button').click()")
+            await opened.call("Input.insertText", text="as it was")
+            await opened.key("Enter")
+            await opened.until("document.querySelector('#current span').textContent == 'this run: as it was'")
             await side_by_side(opened, buttons)
             await opened.ask(f"{buttons}[3].click()")
             await opened.call("Input.insertText", text="without K3")

@@ -109,7 +109,7 @@ class Compare:
 
 @dataclass(frozen=True, slots=True)
 class Rename:
-    """Give another future a name, by its number."""
+    """Give a future a name, by its number, or the run as it goes."""
 
     number: int
     name: str

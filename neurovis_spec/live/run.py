@@ -332,6 +332,8 @@ class Run:
                 self._stand_elsewhere()
             case Compare():
                 self._aside = None if asked.number < 0 else Aside(source, asked.number)
+            case Rename() if asked.number == source.futures.now:
+                source.name = asked.name
             case Rename():
                 source.futures = _known(source, asked.number).renamed(asked.number, asked.name)
             case Forget():

@@ -26,6 +26,8 @@ export class Branches {
     this.current = 0;
     /** @type {Future[]} */
     this.futures = [];
+    /** what it is called, '' where it has no name */
+    this.named = '';
     /** how many were forgotten, −1 where that is not known yet */
     this.dropped = -1;
     /** the one that is shown beside the run @type {number | null} */
@@ -42,12 +44,12 @@ export class Branches {
     this.dropped = dropped;
     this.owner = owner;
     this.find('futures').hidden = !futures.length;
-    this.find('current').hidden = !branch;
-    this.find('current').textContent = branch ? `this one: ${branch}` : '';
+    this.named = branch;
     this.compared = compared;
-    const key = JSON.stringify([futures, owner, compared]);
-    if (key === this.shown || (this.naming >= 0 && this.all(futures).some(({ number }) => number === this.naming)))
-      return;
+    const key = JSON.stringify([futures, owner, compared, branch, current]);
+    const isThere = (/** @type {number} */ one) =>
+      one === current || this.all(futures).some(({ number }) => number === one);
+    if (key === this.shown || (this.naming >= 0 && isThere(this.naming))) return;
     this.shown = key;
     if (this.chosen !== null && !this.all(futures).some(({ number }) => number === this.chosen)) this.choose(null, '');
     this.list(futures);
@@ -80,6 +82,7 @@ export class Branches {
   list(futures) {
     const list = this.find('others'),
       focused = list.contains(document.activeElement);
+    this.find('current').replaceChildren(...this.run());
     list.replaceChildren(...this.rows(futures));
     if (focused) (list.querySelector('button') || this.find('copy')).focus();
   }
@@ -96,6 +99,17 @@ export class Branches {
       if (one.within.length) row.append(inner);
       return row;
     });
+  }
+
+  /** What the run does now, and a button to give that a name. @returns {HTMLElement[]} */
+  run() {
+    const words = document.createElement('span'),
+      { current: number, named: name } = this;
+    words.textContent = name ? `this run: ${name}` : 'this run';
+    if (!this.owner) return [words];
+    const rename = this.button('rename', 'rename this run', () => this.rename({ number, name }, words));
+    rename.className = 'small';
+    return [words, rename];
   }
 
   /** What can be done with a branch. @param {Future} future @returns {HTMLElement} */
@@ -160,7 +174,7 @@ export class Branches {
     return made;
   }
 
-  /** Give a branch another name, in its place. @param {Future} future @param {HTMLElement} place */
+  /** Give a branch another name, in its place. @param {{number: number, name: string}} branch @param {HTMLElement} place */
   rename({ number, name }, place) {
     const field = Object.assign(document.createElement('input'), { value: name, maxLength: 80, className: 'naming' });
     field.setAttribute('aria-label', 'name of the branch');
