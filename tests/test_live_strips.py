@@ -563,6 +563,11 @@ def test_two_signals_share_an_axis_or_span_a_plane_and_part_again(tmp_path: Path
             await opened.until(f"{TRACE.format(0)}?.startsWith('C1 and K2 from step 0 to {step}')")
             ends = str(await opened.ask(TRACE.format(0))).replace("−", "-").partition("between ")[2].split(" and ")
             assert [float(one) for one in ends] == pytest.approx([run["C1"].min(), run["K2"].max()], rel=1e-4)
+            await opened.ask("document.querySelector('#undo').click()")
+            await opened.until(f"{TITLE.format(0)} == 'C1' && {TITLE.format(1)} == 'K2'")
+            assert await opened.ask("document.querySelector('#did').textContent") == "undone: C1 with K2"
+            await opened.ask("document.querySelector('#redo').click()")
+            await opened.until(f"{TITLE.format(0)} == 'C1K2'")
             await opened.ask(JOIN.format(0, "apart"))
             await opened.until(f"{TITLE.format(0)} == 'C1' && {TITLE.format(2)} == 'K2'")
             await opened.ask(JOIN.format(1, "against C1"))
@@ -577,8 +582,16 @@ def test_two_signals_share_an_axis_or_span_a_plane_and_part_again(tmp_path: Path
             assert isinstance(found, list)
             assert found[0] == len(points)
             assert found[1] < 0.7 * len(points)
+            await opened.ask("document.querySelector('#undo').click()")
+            await opened.until(f"{TRACE.format(1)}?.startsWith('O from step 0 to {step}')")
+            await opened.ask("document.querySelector('#redo').click()")
+            await opened.until(f"{TRACE.format(1)}?.startsWith('O against C1 from step 0 to {step}')")
             await opened.ask(JOIN.format(1, "over time"))
             await opened.until(f"{TRACE.format(1)}?.startsWith('O from step 0 to {step}')")
+            await opened.key("f")
+            await opened.until("document.documentElement.classList.contains('presenting')")
+            await opened.ask("document.querySelector('#unpresent').click()")
+            await opened.until("!document.documentElement.classList.contains('presenting')")
 
     asyncio.run(main())
 

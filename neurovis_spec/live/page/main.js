@@ -401,6 +401,7 @@ part('film').onclick = () =>
     share.making(0, 1);
   });
 part('help').onclick = help;
+part('unpresent').onclick = () => share.present();
 const views = { toggle: () => choose(!matrix) };
 part('matrix').onclick = () => views.toggle();
 undo.follow(views, 'the matrix of the weights');

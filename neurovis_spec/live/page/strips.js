@@ -332,7 +332,7 @@ export class Strips {
           strip,
           same,
           strip.what,
-          curves.find(({ items }) => items[0] === same.id),
+          strip.behind.length ? curves.find(({ items }) => items[0] === same.id) : undefined,
         );
       return same;
     });

@@ -222,21 +222,42 @@ export class Undo {
     };
   }
 
-  /** Have strips that are pinned or unpinned be acts. @param {import('./strips.js').Strips} strips */
+  /** Have strips that are pinned, unpinned, joined and parted be acts. @param {import('./strips.js').Strips} strips */
   followPins(strips) {
-    const toggle = strips.toggle.bind(strips);
-    strips.toggle = (...of) => {
-      const before = [...strips.pinned];
-      toggle(...of);
-      const after = [...strips.pinned],
-        one = [...before, ...after].find((strip) => !(before.includes(strip) && after.includes(strip)));
-      if (!one || one.id[0] === 'm') return; // measures are the run's
-      const restore = (/** @type {typeof before} */ pinned) => () => {
-        strips.pinned = [...pinned];
-        strips.use();
-      };
-      const words = `${after.includes(one) ? 'pinned' : 'unpinned'} ${one.told}`;
-      this.act({ words, undo: restore(before), redo: restore(after) });
+    const stand = () => strips.pinned.map((strip) => ({ strip, joined: strip.joined, against: strip.against }));
+    const restore = (/** @type {ReturnType<typeof stand>} */ stood) => () => {
+      for (const { strip, joined, against } of stood) Object.assign(strip, { joined, against });
+      strips.pinned = stood.map(({ strip }) => strip);
+      strips.use();
+    };
+    const [toggle, join] = [strips.toggle.bind(strips), strips.join.bind(strips)];
+    let isWithin = false;
+    /** @param {() => void} does @param {(before: import('./strips.js').Strip[]) => string} words */
+    const follow = (does, words) => {
+      const before = stand(),
+        isInner = isWithin;
+      isWithin = true;
+      does();
+      isWithin = isInner;
+      const told = isInner ? '' : words(before.map(({ strip }) => strip));
+      if (told) this.act({ words: told, undo: restore(before), redo: restore(stand()) });
+    };
+    strips.toggle = (...of) =>
+      follow(
+        () => toggle(...of),
+        (before) => {
+          const after = strips.pinned,
+            one = [...before, ...after].find((strip) => !(before.includes(strip) && after.includes(strip)));
+          // measures are the run's
+          return one && one.id[0] !== 'm' ? `${after.includes(one) ? 'pinned' : 'unpinned'} ${one.told}` : '';
+        },
+      );
+    strips.join = (strip, how) => {
+      const words = `${strip.told} ${strip.join.selectedOptions[0]?.text ?? how}`;
+      follow(
+        () => join(strip, how),
+        () => words,
+      );
     };
   }
 }
