@@ -588,6 +588,7 @@ def test_two_signals_share_an_axis_or_span_a_plane_and_part_again(tmp_path: Path
             await opened.until(f"{TRACE.format(1)}?.startsWith('O against C1 from step 0 to {step}')")
             await opened.ask(JOIN.format(1, "over time"))
             await opened.until(f"{TRACE.format(1)}?.startsWith('O from step 0 to {step}')")
+            await opened.ask("document.querySelector('#picture').focus()")
             await opened.key("f")
             await opened.until("document.documentElement.classList.contains('presenting')")
             await opened.ask("document.querySelector('#unpresent').click()")
