@@ -5,9 +5,10 @@
 
 For each size every contender is measured in turn, several times, in a Chromium of its own, in a window that shows the
 picture a pixel a pixel; what is told is the median. Frames shown are different steps that were drawn, of a run that
-makes one in 16 ms, with all that belongs to it: the run, the server, the websocket, the page. "page" is the
-page's drawing alone, with its labels, and the peers draw the same discs and curves (sigma.js: straight arrows) without
-labels: these have nothing else to do, and make their colours up, as fast as the display asks for frames.
+makes one in 16 ms, with all that belongs to it: the run, the server, the websocket, the page with four curves below its
+picture. "page" is the page's drawing alone, with its labels, and the peers draw the same discs and curves (sigma.js:
+straight arrows) without labels: these have nothing else to do, and make their colours up, as fast as the display asks
+for frames.
 
 From activity to screen: from when a step was made to when the display asks for the frame after the one in which it was
 drawn. Bytes are those of all messages. The run's delay is how late each of its steps is made, from the earliest of
@@ -59,10 +60,12 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "tests"))
 
 from chromium import Page, chromium  # noqa: E402
+from live_window import area_of, fit  # noqa: E402
 
 SIZES = ((12, 28), (150, 200), (200, 400), (448, 7379), (1000, 10_000))
+#: So many curves are drawn below the picture.
+CURVES = 4
 PEERS = ("page", "sigma", "pixi", "stroked")
-BAR = 44
 #: WebGL is drawn by the processor.
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 _SPEC = """neurovis: 1
@@ -157,13 +160,18 @@ def window(view: View) -> tuple[int, int]:
 
 async def ours(compiled: nv.CompiledNetwork, view: View, seconds: float, shot: Path | None) -> Measured:
     """The live page."""
-    width, height = window(view)
+    width, height = area_of(view).size
     with tempfile.TemporaryDirectory() as folder:
         async with served(compiled, view) as (access, source, _), chromium(Path(folder)) as page:
-            await page.size(width, height + BAR)
+            await page.size(width, height)
             await page.call("Page.addScriptToEvaluateOnNewDocument", source=_NOTES)
             await page.call("Page.navigate", url=access.url())
             await page.until("window.notes?.frames.length > 10", 60)
+            await page.ask("document.querySelectorAll('#strips .pin').forEach((pin) => pin.click())")
+            for name in compiled.network.neurons.names[:CURVES]:
+                await page.ask(f"measure.value = {json.dumps(name)}; measuring.requestSubmit()")
+            await fit(page, width, height)
+            assert await page.ask("document.querySelectorAll('#strips .trace').length") == CURVES + 1
             await page.ask("Object.assign(notes, { bytes: 0, frames: [], begun: performance.now() }); 0")
             await asyncio.sleep(seconds)
             found = await page.ask("[notes.frames, notes.bytes, performance.now() - notes.begun]")
