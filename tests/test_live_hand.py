@@ -114,6 +114,10 @@ def dark(shot: bytes, x: float, y: float) -> int:
     return sum(corner.histogram()[:60])
 
 
+#: What the menu of what is saved offers.
+CHOICES = (
+    "[...document.querySelectorAll('#saves button')].filter((b) => b.offsetParent && !b.disabled).map((b) => b.id)"
+)
 PUT = "document.querySelector('#placed').textContent"
 
 
@@ -324,6 +328,8 @@ def test_a_viewer_moves_the_picture_instead(tmp_path: Path) -> None:
             assert desk.placed.moved == ()
             for button in ("unplace", "tospec", "tofile", "svg", "pdf", "npz", "film"):
                 assert await opened.ask(f"document.querySelector('#{button}').disabled")
+            await opened.ask("document.querySelector('#save').click()")
+            await opened.until(f'JSON.stringify({CHOICES}) == \'["png","clip","link","present"]\'')
 
     asyncio.run(main())
 
@@ -376,6 +382,7 @@ def test_the_owner_has_the_picture_a_film_and_the_recording_as_files(tmp_path: P
             await opened.until(f"{STEP} > 30")
             step = await pause(opened)
             await opened.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+            assert await opened.ask("document.querySelectorAll('#turning :is(#svg, #film, #link)').length") == 0
 
             async def saved(button: str, name: str) -> bytes:
                 await opened.ask(f"document.querySelector('#{button}').click()")
@@ -394,8 +401,56 @@ def test_the_owner_has_the_picture_a_film_and_the_recording_as_files(tmp_path: P
                 "document.querySelector('#seconds').value = 1; document.querySelector('#kind').value = 'gif'"
             )
             assert (await saved("film", "cpg_rbf.gif")).startswith(b"GIF")
+            await opened.until("document.querySelector('#film').textContent == 'film of the last'")
+            await opened.ask("document.querySelector('#kind').value = 'webm'")
+            assert (await saved("film", "cpg_rbf.webm")).startswith(bytes.fromhex("1a45dfa3"))
             await saved("npz", "cpg_rbf.npz")
             found, run = nv.load(tmp_path / "cpg_rbf.npz"), record(desk.placed.compiled.network, Course(step + 1))
             assert (found.activity == run.activity).all()
+
+    asyncio.run(main())
+
+
+def test_the_menu_of_what_is_saved_goes_by_keys_and_writes_the_spec_with_events(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path) as (opened, _, spec):
+            text = spec.read_text()
+            await opened.until(f"{STEP} > 5")
+            step = await pause(opened)
+            await opened.key("]")
+            await opened.ask("document.querySelector('#save').focus(), document.activeElement.click()")
+            await opened.until("document.activeElement.id == 'svg'")
+            await opened.until(f"document.querySelector('#upto').textContent == 'up to step {step}'")
+            assert await opened.ask("document.querySelector('#withevents').disabled")
+            edges = "['#saves', '#save'].map((one) => document.querySelector(one).getBoundingClientRect())"
+            assert await opened.ask(f"(([menu, bar]) => 0 <= menu.top && menu.bottom <= bar.top)({edges})"), "upward"
+            await opened.key("ArrowDown")
+            await opened.until("document.activeElement.id == 'pdf'")
+            await opened.key("ArrowUp")
+            await opened.key("ArrowUp")
+            await opened.until("document.activeElement.id == 'present'")
+            await opened.key("Escape")
+            await opened.until("document.activeElement.id == 'save'")
+            assert await opened.ask(STEP) == step, "arrows go through the menu, not the run"
+            assert await opened.ask("document.querySelector('#parted').offsetParent || !part.hidden"), (
+                "it is held still"
+            )
+
+            await opened.ask("document.querySelector('#lesion').click()")
+            await opened.until("!document.querySelector('#withevents').disabled")
+            await opened.ask("document.querySelector('#withevents').click()")
+            await opened.until("document.querySelector('#saving').open")
+            assert "+events:\n" in str(await opened.ask("document.querySelector('#diff').textContent"))
+            await opened.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+            await opened.ask("document.querySelector('#download').click()")
+            for _ in range(200):
+                if (tmp_path / spec.name).exists():
+                    break
+                await asyncio.sleep(0.02)
+            fetched = (tmp_path / spec.name).read_text()
+            assert spec.read_text() == text
+            await opened.ask("document.querySelector('#write').click()")
+            await opened.until("!document.querySelector('#saving').open")
+            assert spec.read_text() == fetched == text + f"\nevents:\n  - {{at: {step + 1}, lesion: C1}}\n"
 
     asyncio.run(main())

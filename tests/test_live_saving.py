@@ -6,7 +6,7 @@ import io
 import json
 import re
 import struct
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
@@ -21,6 +21,8 @@ from PIL import Image
 from scenes import file_of, scene_of
 
 import neurovis_spec as nv
+from neurovis_spec.language.format.append import append
+from neurovis_spec.live.as_events import as_events
 from neurovis_spec.live.commands import Fetch, Seek
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.recorded import RecordedSource
@@ -29,7 +31,7 @@ from neurovis_spec.live.saving import film, picture, recording, steps_for, told_
 from neurovis_spec.live.show import Show
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError
-from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Turned, Weigh
+from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, Weigh
 from neurovis_spec.live.view import view_of
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene.film_size import frames_a_second
@@ -193,48 +195,6 @@ def turns(parts: tuple[list[str], ...]) -> st.SearchStrategy[Turn]:
     )  # fmt: skip
 
 
-def events(turned: Sequence[Turned]) -> str:
-    """What the page copies (``page/events.js``): of what is turned twice at one step the last counts."""
-    last: dict[tuple[int, str, str], Turn] = {}
-    for entry in turned:
-        match entry.turn:
-            case Set(values):
-                for name, value in values.items():
-                    last[entry.step + 1, "set", name] = Set({name: value})
-            case Hold(neurons) | Release(neurons):
-                last[entry.step + 1, "clamp", neurons] = entry.turn
-            case Lesion(part) | Mend(part):
-                last[entry.step + 1, "part", part] = entry.turn
-            case Learn(connections):
-                last[entry.step + 1, "learn", connections] = entry.turn
-            case Feed(name):
-                last[entry.step + 1, "feed", name] = entry.turn
-            case Weigh(connections):
-                last[entry.step + 1, "weigh", connections] = entry.turn
-    lines, all = [], list(last.items())
-    for place, ((at, _, name), what) in enumerate(all):
-        match what:
-            case Set(values):
-                lines.append(f"{{at: {at}, set: {{{name}: {values[name]!r}}}}}")
-            case Hold(_, value):
-                ends = [
-                    f"to: {end}, " for (end, kind, other), _ in all[place + 1 :] if (kind, other) == ("clamp", name)
-                ]
-                lines.append(f"{{from: {at}, {''.join(ends[:1])}clamp: {{{name}: {value!r}}}}}")
-            case Lesion():
-                lines.append(f"{{at: {at}, lesion: {name}}}")
-            case Mend():
-                lines.append(f"{{at: {at}, mend: {name}}}")
-            case Weigh(_, value):
-                lines.append(f"{{at: {at}, set: {{{name}: {value!r}}}}}")
-            case Feed(_, given):
-                number = str([*given]) if len(given) > 1 else given[0] if given else "null"
-                lines.append(f"{{at: {at}, feed: {{{name}: {number}}}}}")
-            case Learn(_, on):
-                lines.append(f"{{at: {at}, learning: {{{name}: {str(on).lower()}}}}}")
-    return "".join(f"  - {line}\n" for line in lines)
-
-
 def equal(one: Recording, other: Recording, but: Collection[str] = ()) -> None:
     """That two recordings hold the same, bit for bit."""
     for field in fields(Recording):
@@ -256,7 +216,8 @@ def test_what_is_saved_is_the_run_of_the_spec_with_the_events_that_are_copied(
     with pytest.MonkeyPatch.context() as patched:
         toy_bodies.registered(patched)
         text, compile, parts = SAVED[name]
-        network = compile(text if text is FOLLOWING else text.removesuffix("events:\n"))
+        given = text if text is FOLLOWING else text.removesuffix("events:\n")
+        network = compile(given)
         source = SimulatedSource(network.simulator())
         for what, steps in data.draw(st.lists(st.tuples(turns(parts), st.integers(-2, 4)), max_size=8)):
             with suppress(SourceError):
@@ -264,11 +225,11 @@ def test_what_is_saved_is_the_run_of_the_spec_with_the_events_that_are_copied(
             source.go(min(source.number_after(steps), source.reach.last))
             for _ in range(steps):
                 source.advance()
-        copied = events(source.turned)
-        assume(copied)
+        copied = as_events(source.turned)
+        assume(copied.text)
         told = told_by(source, 1000)
         (tmp_path / "x.npz").write_bytes(recording(network.network, told))
-        saved, again = nv.load(tmp_path / "x.npz"), compile(text + copied)
+        saved, again = nv.load(tmp_path / "x.npz"), compile(append(given, "events", copied.entries, copied.comments))
         run = again.run(source.step + 1)
         last = [entry.turn for entry in source.turned if entry.step == source.step]
         at_the_end = any(isinstance(what, Set | Lesion | Mend | Weigh) for what in last)
@@ -296,7 +257,7 @@ def test_the_pictures_that_are_saved_are_those_of_the_run_of_the_spec_with_the_e
         source.turn(what)
         source.advance()
         source.advance()
-    again = compile(text + events(source.turned))
+    again = compile(append(text, "events", as_events(source.turned).entries))
     view, same = (view_of(one, network.gains) for one in (network, again))
     played = RecordedSource(again.network, again.run(source.step + 1))
     played.go(source.step)

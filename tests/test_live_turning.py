@@ -68,6 +68,7 @@ def test_a_field_without_a_number_within_its_bounds_turns_nothing_and_says_so(tm
                 await opened.ask(f"document.activeElement.blur(), {field}.value = '{bad}'")
                 await opened.ask(f"{field}.dispatchEvent(new Event('change'))")
                 assert await opened.ask(f"document.activeElement == {field} && {field}.matches(':invalid')")
+            await opened.ask("document.querySelector('#saves').showPopover()")
             for name, bad, button in (("clampto", "", "clamp"), ("seconds", "999", "film"), ("seconds", "", "film")):
                 await opened.ask(f"document.querySelector('#{name}').value = '{bad}'")
                 await opened.ask(f"document.querySelector('#{button}').click()")

@@ -185,11 +185,11 @@ Showing: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Resta
 Command: TypeAlias = Showing | Branching | Loop | Unloop | Measure | Unmeasure | Turn
 
 
-#: Where what was put by hand is written: into ``layout.positions`` of the spec, or into the layout file that the spec
-#: (then) names.
-Into: TypeAlias = Literal["spec", "file"]
-#: What can be had as a file: a picture, a film (``film`` is a moving SVG), a recording.
-What: TypeAlias = Literal["svg", "pdf", "film", "mp4", "webm", "gif", "npz"]
+#: What is written: what was put by hand, into ``layout.positions`` of the spec, or into the layout file that the spec
+#: (then) names; or what was turned, into the ``events`` of the spec.
+Into: TypeAlias = Literal["spec", "file", "events"]
+#: What can be had as a file: a picture, a film (``film`` is a moving SVG), a recording, the spec with events.
+What: TypeAlias = Literal["svg", "pdf", "film", "mp4", "webm", "gif", "npz", "yaml"]
 #: Those of one step.
 STILLS: Final = frozenset({"svg", "pdf"})
 
@@ -222,7 +222,8 @@ class Write:
 
 @dataclass(frozen=True, slots=True)
 class Fetch:
-    """Have the picture, a film of the last ``seconds``, or the recording; pictures in a ``theme``, "" for their own."""
+    """Have the picture, a film of the last ``seconds``, the recording, or the spec with events; pictures in a
+    ``theme``, "" for their own."""
 
     what: What
     seconds: float

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Condition, RLock, Thread
-from typing import Final, TypeAlias
+from typing import Final, TypeAlias, TypeVar
 
 from neurovis_spec.compilation import Compilation
 from neurovis_spec.diagnostics import SpecError, show_text
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.commands import STILLS, Appearance, Fetch, PlaceNeuron, Request, Save, Unplace, Write
-from neurovis_spec.live.pins import Compile, Placed, Saving, SavingError, placed, saving
+from neurovis_spec.live.pins import Compile, File, Placed, Saving, SavingError, placed, saving
 from neurovis_spec.live.protocol import (
     file_message,
     making_message,
@@ -29,11 +29,14 @@ from neurovis_spec.live.protocol import (
     saving_message,
 )
 from neurovis_spec.live.run import Run, Stage
-from neurovis_spec.live.saving import Told, film, picture, recording, steps_for, told_by
+from neurovis_spec.live.saving import film, picture, recording, steps_for, told_by
 from neurovis_spec.live.source import Source, SourceError
+from neurovis_spec.live.turns import Turned
 from neurovis_spec.live.view import View
+from neurovis_spec.live.with_events import WithEvents, with_events
 from neurovis_spec.progress import Progress
 
+_Had = TypeVar("_Had")
 #: Tells who has asked.
 Answer: TypeAlias = Callable[[str | bytes], None]
 
@@ -72,6 +75,9 @@ class Desk:
         self._view: View | None = None
         self._before: deque[Placed] = deque(maxlen=_UNDONE)
         self._saving: Saving | None = None
+        #: the spec with events that is to be written, and as it was written last
+        self._events: WithEvents | None = None
+        self._noted: WithEvents | None = None
         self._asked: deque[tuple[Request, Answer]] = deque()
         self._wake, self._work_lock = Condition(), RLock()
         self._ended = False
@@ -153,12 +159,20 @@ class Desk:
                     raise SavingError("nothing was put by hand")
                 self._placed = self._before.pop()
                 self._show(answer)
+            case Save(into="events"):
+                self._events, file = self._with_events()
+                self._saving = Saving((file,))
+                answer(saving_message([str(file.path)], file.diff, written=False, into="events"))
             case Save():
+                self._events = None
                 self._saving = saving(self._placed, self._written().path, self._written().compile, request.into)
                 names = [str(file.path) for file in self._saving.files]
-                answer(saving_message(names, self._saving.diff, written=False))
+                answer(saving_message(names, self._saving.diff, written=False, into=request.into))
             case Write():
                 self._write(answer)
+            case Fetch(what="yaml"):
+                file = self._with_events()[1]
+                answer(file_message(file.path.name, file.after.encode()))
             case Fetch():
                 answer(self._fetch(request, answer))
 
@@ -168,26 +182,39 @@ class Desk:
         network = self._placed.compiled.network
         seconds = None if request.what == "npz" else request.seconds
         steps = 1 if request.what in STILLS else steps_for(network, seconds)
-        found: SimpleQueue[Told | str] = SimpleQueue()
-
-        def look(source: Source) -> None:
-            if source.network.hash != network.hash:
-                raise SourceError("the spec was edited meanwhile")
-            found.put(told_by(source, steps))
-
-        self._run.inquire(look, found.put)
-        try:
-            told = found.get(timeout=_PATIENCE)
-        except Empty:
-            raise SavingError("the steps could not be had: the run is busy, or has ended") from None
-        if isinstance(told, str):
-            raise SavingError(told)
+        told = self._inquire(lambda source: told_by(source, steps))
         if request.what == "npz":
             return file_message(f"{name}.npz", recording(network, told))
         suffix = ".svg" if request.what == "film" else f".{request.what}"
         if request.what in STILLS:
             return file_message(f"{name}{suffix}", picture(view, told, suffix))
         return file_message(f"{name}{suffix}", film(view, told, suffix, _telling(answer)))
+
+    def _inquire(self, tell: Callable[[Source], _Had]) -> _Had:
+        """What the source tells of the network that is shown. Raises SavingError."""
+        shown = self._placed.compiled.network.hash
+        told, found = list[_Had](), SimpleQueue[str]()
+
+        def look(source: Source) -> None:
+            if source.network.hash != shown:
+                raise SourceError("the spec was edited meanwhile")
+            told.append(tell(source))
+            found.put("")
+
+        self._run.inquire(look, found.put)
+        try:
+            reason = found.get(timeout=_PATIENCE)
+        except Empty:
+            raise SavingError("the steps could not be had: the run is busy, or has ended") from None
+        if reason:
+            raise SavingError(reason)
+        return told[0]
+
+    def _with_events(self) -> tuple[WithEvents, File]:
+        """The spec with what was turned as its events. Raises SavingError, SpecError, OSError."""
+        spec, data = self._written(), self._written().path.read_bytes()
+        made = with_events(data.decode(), self._placed.compiled.hash, self._inquire(_turned), spec.compile, self._noted)
+        return made, File(spec.path, data, made.after)
 
     def _written(self) -> Written:
         if self._spec is None:
@@ -199,12 +226,17 @@ class Desk:
         if chosen is None:
             raise SavingError("nothing was chosen to be saved")
         chosen.write()
+        self._saving = None
+        files = [str(file.path) for file in chosen.files]
+        if self._events is not None:  # nothing is drawn otherwise
+            self._noted = self._events
+            answer(saving_message(files, "", written=True, into="events"))
+            return
         compiled = spec.compile(spec.path.read_text(encoding="utf-8-sig"))
         self._placed = Placed(compiled, self._placed.engine, self._placed.layout)
-        self._saving = None
         self._before.clear()
         self._say()
-        answer(saving_message([str(file.path) for file in chosen.files], "", written=True))
+        answer(saving_message(files, "", written=True))
 
     def _shown(self) -> View:
         """The view of the layout with the neurons placed by hand."""
@@ -229,6 +261,13 @@ class Desk:
     def _say(self) -> None:
         """Tell everybody what is put by hand."""
         self._tell(placed_message(self._placed.moved, undo=bool(self._before), files=self._spec is not None))
+
+
+def _turned(source: Source) -> tuple[Turned, ...]:
+    """What was turned. Raises SourceError where nothing can be."""
+    if "undo" not in source.capabilities.takes:
+        raise SourceError("nothing is turned in what is played: it has no events to be saved")
+    return source.turned
 
 
 def _telling(answer: Answer) -> Progress:

@@ -23,6 +23,7 @@ from neurovis_spec.body import text_of
 from neurovis_spec.compiler.drawing.pins import FARTHEST
 from neurovis_spec.diagnostics import Diagnostic
 from neurovis_spec.layout.model import Point
+from neurovis_spec.live.as_events import as_events
 from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.commands import (
     MOST,
@@ -34,6 +35,7 @@ from neurovis_spec.live.commands import (
     Event,
     Fetch,
     Forget,
+    Into,
     Loop,
     Measure,
     Pause,
@@ -176,6 +178,7 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         fed={name: list(values) for name, values in status.fed.items() if all(map(math.isfinite, values))},
         learning=dict(status.learning),
         turned=[_listed(entry) for entry in status.turned[-_LISTED:]],
+        copied=as_events(status.turned[-_LISTED:]).text,
         events=list(status.events[:_LISTED]),
         appearance=asdict(status.appearance),
         backend=status.backend,
@@ -286,9 +289,9 @@ def placed_message(neurons: Sequence[str], undo: bool, files: bool) -> str:
     return _text("placed", neurons=list(neurons), undo=undo, files=files)
 
 
-def saving_message(files: Sequence[str], diff: str, written: bool) -> str:
-    """What would change in which files, or that these are written."""
-    return _text("saving", files=list(files), diff=diff, written=written)
+def saving_message(files: Sequence[str], diff: str, written: bool, into: Into = "spec") -> str:
+    """What would change in which files, or that these are written; ``into`` is what was asked for."""
+    return _text("saving", files=list(files), diff=diff, written=written, into=into)
 
 
 def making_message(done: int, total: int) -> str:
@@ -598,7 +601,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "weigh": ({"connections": _name, "value": _number, "moving": _truth}, Weigh),
     "place": ({"neuron": _name, "at": _point, "done": _truth}, PlaceNeuron),
     "unplace": ({}, Unplace),
-    "save": ({"into": _one_of("spec", "file")}, Save),
+    "save": ({"into": _one_of(*get_args(Into))}, Save),
     "write": ({}, Write),
     "fetch": ({"what": _one_of(*get_args(What)), "seconds": _seconds}, Fetch),
 }

@@ -28,11 +28,11 @@ import { Link } from './protocol.js';
 import { Range } from './range.js';
 import { Refusal } from './refusal.js';
 import { bare, frame, Room, staying } from './room.js';
-import { download, savePng } from './save.js';
+import { download } from './save.js';
+import { Saves } from './saves.js';
 import { say } from './say.js';
 import { Scrubber } from './scrubber.js';
 import { Share } from './share.js';
-import { withNumber } from './sliders.js';
 import { Strips } from './strips.js';
 import { told } from './told.js';
 import { Turning } from './turning.js';
@@ -106,6 +106,7 @@ function show() {
   outline.show(look);
   turning.weight.show(attention.values);
   controls.frame(look);
+  saves.frame();
   part('caption').textContent = look.caption;
   scrubber.show(look);
   axis.show();
@@ -224,6 +225,7 @@ const link = new Link({
       branches.status(message);
       aside.status(message);
       placing.status(message);
+      saves.status(message);
       range.status(message);
       strips.owner = message.owner;
       strips.measures(message.measures);
@@ -233,8 +235,10 @@ const link = new Link({
     else if (message.type === 'findings') controls.found(message);
     else if (message.type === 'undefined') notFinite.tell(message, controls.owner);
     else if (message.type === 'moved') placing.take(message);
-    else if (message.type === 'placed') placing.told(message);
-    else if (message.type === 'saving') {
+    else if (message.type === 'placed') {
+      placing.told(message);
+      saves.placed(message);
+    } else if (message.type === 'saving') {
       placing.saving(message);
       if (message.written) controls.tell(`saved ${message.files.join(', ')}`);
     } else if (message.type === 'measured') measuring.take(message);
@@ -283,6 +287,7 @@ const body = new Body(part('embodied'), part('posed'), part('bodily'), part('spa
 const share = new Share(link, camera, strips, attention, controls, body, redraw, part, branches, (words) =>
   refusal.tell(words),
 );
+const saves = new Saves(link, body, (done, total) => share.making(done, total), part);
 
 /** Show the matrix in place of the picture, or the picture. @param {boolean} asMatrix */
 function choose(asMatrix) {
@@ -391,15 +396,6 @@ function tellAll() {
 function help() {
   listKeys(/** @type {HTMLDialogElement} */ (part('keys')), controls.keys);
 }
-part('png').onclick = () => {
-  if (link.scene && link.look) savePng(link.scene, link.look, body);
-};
-for (const what of ['svg', 'pdf', 'npz']) part(what).onclick = () => link.ask('fetch', { what, seconds: 1 });
-part('film').onclick = () =>
-  withNumber(part('seconds'), (seconds) => {
-    link.ask('fetch', { what: /** @type {HTMLSelectElement} */ (part('kind')).value, seconds });
-    share.making(0, 1);
-  });
 part('help').onclick = help;
 part('unpresent').onclick = () => share.present();
 const views = { toggle: () => choose(!matrix) };

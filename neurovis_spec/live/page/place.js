@@ -234,11 +234,12 @@ export class Placing {
     }
   }
 
-  /** What would be written, or was. @param {{files: string[], diff: string, written: boolean}} saving */
+  /** What would be written, or was. @param {{files: string[], diff: string, written: boolean, into: string}} saving */
   saving(saving) {
     const { dialog, find } = this;
     find('diff').textContent = saving.diff || 'nothing has changed';
     find('write').hidden = !saving.diff;
+    find('download').hidden = saving.into !== 'events';
     if (saving.written) {
       dialog.close();
     } else if (!dialog.open) {

@@ -52,7 +52,7 @@ import { isStill } from './camera.js';
  * @typedef {{number: number, at: number, last: number, turned: Turned[], within: Future[], name: string, older: boolean}} Future */
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
  *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
- *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains, backend: string, futures: Future[], dropped: number, current: number, branch: string, compared: number | null, measures: {number: number, text: string}[], loop: number[] | null}} Status */
+ *   learning: Object<string, boolean | null>, turned: Turned[], copied: string, events: number[], appearance: Gains, backend: string, futures: Future[], dropped: number, current: number, branch: string, compared: number | null, measures: {number: number, text: string}[], loop: number[] | null}} Status */
 /** What is not finite: the first, since which step, or an earlier one that is not known, and how many are; '' where nothing is.
  * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
@@ -62,7 +62,7 @@ import { isStill } from './camera.js';
  *   | Nonfinite
  *   | {type: 'moved', discs: Object<string, number[]>, lines: Object<string, number[][]>}
  *   | {type: 'placed', neurons: string[], undo: boolean, files: boolean}
- *   | {type: 'saving', files: string[], diff: string, written: boolean}
+ *   | {type: 'saving', files: string[], diff: string, written: boolean, into: string}
  *   | {type: 'measured', text: string, findings: {start: number, end: number, message: string, hint: string}[]}
  *   | {type: 'refused', reason: string}} Message */
 /** @typedef {{scene: (scene: Scene) => void, frame: () => void, aside: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,

@@ -38,8 +38,3 @@ export function pixelsOf(scene, look, body) {
     canvas.toBlob((blob) => (blob ? done(blob) : failed(new Error('no picture'))));
   });
 }
-
-/** Save that. @param {Scene} scene @param {Look} look @param {Body} body */
-export async function savePng(scene, look, body) {
-  download(await pixelsOf(scene, look, body), `${scene.name}.png`);
-}

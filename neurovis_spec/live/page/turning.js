@@ -3,7 +3,6 @@
  */
 
 import { Appearance, drawnOtherwise } from './appearance.js';
-import { eventsOf } from './events.js';
 import { Feeds } from './feeds.js';
 import { Rules } from './rules.js';
 import { Sliders, withNumber } from './sliders.js';
@@ -90,7 +89,7 @@ export class Turning {
     this.feeds.show(status.fed);
     this.rules.show(status.learning);
     this.list(status.turned, status.appearance);
-    /** @type {HTMLTextAreaElement} */ (this.find('events')).value = eventsOf(status.turned);
+    /** @type {HTMLTextAreaElement} */ (this.find('events')).value = status.copied;
   }
 
   /** List what was turned, the latest first, and after that what is drawn otherwise.
