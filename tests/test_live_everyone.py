@@ -73,6 +73,13 @@ def test_axe_finds_nothing_whatever_is_open(theme: str, tmp_path: Path) -> None:
             await opened.ask("document.querySelector('#lesion').click()")
             await opened.until("document.querySelector('#turned').children.length")
             assert await violations(opened) == [], "turning"
+            await opened.ask("document.querySelector('#save').click()")
+            await opened.until("document.activeElement.id == 'svg'")
+            assert await violations(opened) == [], "saving"
+            await opened.ask("document.querySelector('#present').click()")
+            await opened.until("!document.querySelector('#saves').offsetParent")
+            await opened.ask("document.querySelector('#picture').focus()")
+            await opened.key("f")
             await opened.ask("document.querySelector('#back').click()")
             await opened.ask("document.querySelector('#mend').click()")
             await opened.until("document.querySelectorAll('#others button').length == 5")

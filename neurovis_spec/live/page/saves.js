@@ -25,12 +25,13 @@ export class Saves {
     this.button = find('save');
     this.hasFile = false;
     this.isTurned = false;
-    const closing = (/** @type {string} */ id, /** @type {() => void} */ action) => {
-      find(id).onclick = () => {
+    const closing = (/** @type {string} */ id, /** @type {() => void} */ action = () => {}) => {
+      find(id).addEventListener('click', () => {
         if (this.menu.matches(':popover-open')) this.menu.hidePopover();
         action();
-      };
+      });
     };
+    closing('present');
     closing('png', async () => {
       const { scene, look } = link;
       if (scene && look) download(await pixelsOf(scene, look, body), `${scene.name}.png`);
