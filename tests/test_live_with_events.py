@@ -13,6 +13,7 @@ import pytest
 from test_live_saving import FOLLOWING
 
 import neurovis_spec as nv
+from neurovis_spec.live.carry import carried
 from neurovis_spec.live.commands import Fetch, Save, Seek, Write
 from neurovis_spec.live.desk import Desk, Written
 from neurovis_spec.live.pins import Compile, SavingError
@@ -22,7 +23,7 @@ from neurovis_spec.live.show import Show
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Source
 from neurovis_spec.live.turns import Hold, Lesion, Release, Set, Turn, Turned, Weigh
-from neurovis_spec.live.with_events import WithEvents, with_events
+from neurovis_spec.live.with_events import with_events
 
 ODD = """neurovis:   1     # mine
 name: odd
@@ -74,6 +75,14 @@ def turned_in_the_past(source: SimulatedSource) -> None:
         source.advance()
 
 
+def does(source: SimulatedSource, text: str, path: Path) -> None:
+    """That the run of a text is what a source has shown, as far as that can be gone back to, bit for bit."""
+    path.write_bytes(text.encode())
+    run = nv.compile(path).run(source.step + 1)
+    for one in source.recall(1000):
+        assert one.snapshot.activity.tobytes() == run.activity[one.snapshot.step].tobytes()
+
+
 @pytest.mark.parametrize("name", [*TEXTS, "following"])
 def test_it_does_what_the_branch_that_is_shown_did_and_all_else_stays(name: str, tmp_path: Path) -> None:
     text, compile = TEXTS.get(name, FOLLOWING), compiler(tmp_path)
@@ -83,10 +92,7 @@ def test_it_does_what_the_branch_that_is_shown_did_and_all_else_stays(name: str,
     made = with_events(text, network.hash, source.turned, compile)
     kinds = {kind for kind, *_ in SequenceMatcher(None, text, made.after, autojunk=False).get_opcodes()}
     assert kinds == {"equal", "insert"}
-    (tmp_path / "odd.yaml").write_bytes(made.after.encode())
-    run = nv.compile(tmp_path / "odd.yaml").run(source.step + 1)
-    for one in source.recall(1000):
-        assert one.snapshot.activity.tobytes() == run.activity[one.snapshot.step].tobytes()
+    does(source, made.after, tmp_path / "odd.yaml")
     assert "A1 -> A2" not in made.after.replace(text, ""), "it is of the other branch"
 
 
@@ -107,16 +113,31 @@ def test_what_no_event_does_is_a_comment_and_nothing_turned_is_refused(tmp_path:
 
 
 def test_a_spec_that_runs_with_what_was_saved_has_it_once(tmp_path: Path) -> None:
-    """As with --watch: the run goes on in the spec that was written; or begins anew in it."""
-    compile, one, two = compiler(tmp_path), Turned(4, Lesion("A1")), Turned(9, Lesion("A2"))
-    saved = with_events(ODD, compile(ODD).hash, [one], compile)
-    shown = compile(saved.after).hash
-    both = with_events(saved.after, shown, [one, two], compile, saved)
-    assert both.after == with_events(ODD, compile(ODD).hash, [one, two], compile).after
-    anew = with_events(saved.after, shown, [two], compile, saved)
-    assert anew.after == both.after
-    other = WithEvents(ODD, ODD + "# edited\n", (one,))
-    assert with_events(saved.after, shown, [two], compile, other).after == both.after
+    """With --watch the run goes on in the spec that was written, is turned on, and begins anew in it."""
+    compile, path = compiler(tmp_path), tmp_path / "odd.yaml"
+    path.write_text(ODD)
+    network = nv.compile(path)
+    source = SimulatedSource(network.simulator())
+    turned_in_the_past(source)
+    saved = with_events(ODD, network.hash, source.turned, compile)
+    path.write_text(saved.after)
+    again = nv.compile(path)
+    watched = carried(source, again.simulator())
+    watched.turn(Lesion("A2"))
+    for _ in range(5):
+        watched.advance()
+    more = with_events(saved.after, again.hash, watched.turned, compile, saved)
+    assert more.after.startswith(saved.after)
+    assert more.after.count("A2") == saved.after.count("A2") + 1
+    does(watched, more.after, path)
+    watched.restart()
+    watched.turn(Lesion("A3"))
+    for _ in range(30):
+        watched.advance()
+    anew = with_events(saved.after, again.hash, watched.turned, compile, saved)
+    assert anew.after == saved.after + "  - {at: 1, lesion: A3}\n"
+    does(watched, anew.after, path)
+    assert with_events(saved.after, again.hash, watched.turned, compile).after == anew.after
 
 
 @contextmanager
