@@ -5,14 +5,17 @@ from __future__ import annotations
 import io
 import re
 from dataclasses import replace
+from types import ModuleType
 from typing import Literal
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from neurovis_renderers import apart, moving
 from neurovis_renderers.animated_svg import AnimatedSvgRenderer
 from neurovis_renderers.canvas import paint
 from neurovis_renderers.frames import frames
+from neurovis_renderers.moving import Moving, Painter
 from neurovis_renderers.raster import PillowRenderer
 from neurovis_renderers.svg import SvgRenderer, png
 from PIL import Image as Pillow
@@ -225,6 +228,33 @@ def test_the_frames_of_what_moves_are_those_of_its_stills() -> None:
     film = replace(FILM, scene=scene, shifts=("cursor", "more"), shift_values=shifts)
     for frame, picture in enumerate(frames(film)):
         assert np.abs(picture.astype(int) - paint(still(film, frame))).max() <= 1
+
+
+@pytest.mark.parametrize(("module", "limit"), [(moving, "FRAMES"), (apart, "_MOST_PIXELS"), (apart, "_MOST")])
+def test_what_stands_apart_is_the_same_whatever_is_drawn_at_once(
+    module: ModuleType, limit: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where it leaves the page, at each side, fades and lies over what moves otherwise."""
+    moves = np.array([[[0, 0], [0, 0]], [[-15, 50], [-70, -90]], [[120, -4], [500, 0]]], float)
+    dashed = Spline(((25.0, 10.0), (30.0, 30.0), (20.0, 60.0), (29.0, 90.0)), INK, 2.0, dash=(6.0, 3.0))
+    there = Group((*leg(2), dashed, *SCENE.groups[1].shapes), "there")
+    groups = (SCENE.groups[2], there, Group(leg(0), "leg"), SCENE.groups[3])
+    made = replace(
+        FILM,
+        scene=replace(SCENE, groups=groups),
+        fills=(),
+        fill_values=np.zeros((3, 0)),
+        shifts=("cursor", "there"),
+        shift_values=moves,
+        redrawn={"leg": lambda frame: tuple(shifted(shape, (-40.0 * frame, 0.0)) for shape in leg(frame))},
+        faint={"there": 1},
+        faintness=0.3,
+    )
+    at_once = list(frames(made))
+    assert all(np.abs(picture.astype(int) - paint(still(made, at))).max() <= 2 for at, picture in enumerate(at_once))
+    monkeypatch.setattr(module, limit, 1)
+    painter = Painter(Moving(made))
+    assert all(np.array_equal(painter.paint(at), picture) for at, picture in enumerate(at_once))
 
 
 def test_a_film_in_which_only_a_group_moves_has_its_frames() -> None:

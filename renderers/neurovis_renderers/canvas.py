@@ -25,8 +25,6 @@ Pixels = npt.NDArray[np.uint8]
 MOST_AT_ONCE = 1 << 21
 #: Shapes, pieces of lines, and pixels that may be touched, that are drawn at a time.
 _MOST_SHAPES, _MOST_PIECES, _MOST_TOUCHED = 1 << 18, 1 << 16, 1 << 20
-#: Fragments that shapes may have which are drawn at once, whatever hides them.
-_MOST_LAYER = 1 << 22
 #: Pixels for a fragment from which on most are known to be empty.
 _SPARSE = 8
 #: Pixels along the side of a block: a piece of which all blocks are covered is not looked at.
@@ -72,28 +70,54 @@ def veiled(
     return inner.veil(opacity)
 
 
-def layer(sheet: Sheet, corner: Size, size: Size, opacity: float) -> tuple[Fragments, IntArray]:
-    """The same of all shapes, where they are few, at once."""
-    if sheet.most(size) > _MOST_LAYER:
-        return veiled(sheet, 0, len(sheet), corner, size, opacity)[:2]
-    front, strokes = len(sheet), sheet.strokes(sheet.pieces, corner, size, None)
-    found = Portion(front, sheet.solid(0, front, corner, size), strokes, sheet.heads(0, front, corner, size))
-    fragments = found.fragments(sheet)
-    if len(fragments) * _SPARSE < size[0] * size[1]:
-        by_pixel = slots(fragments, front)
-        left, sums = by_pixel.composed(fragments.shares, sheet.paints[fragments.owners])
-        return _as_one(by_pixel.pixels, sums, left, opacity)
-    left, sums = np.full(size[0] * size[1], WHOLE, np.float32), np.zeros(size[0] * size[1], np.int64)
-    behind = _foremost(fragments, len(left))
-    some = fragments.only(np.flatnonzero((fragments.shares < 1) & (fragments.owners > behind[fragments.pixels])))
+@dataclass(frozen=True, slots=True)
+class Composed:
+    """Pixels in which anything is seen, the colour of each, and its weight; and apart from these, in order, those in
+    which one shape alone is seen, which covers them, and which it is."""
+
+    pixels: IntArray
+    colours: IntArray
+    weights: Numbers
+    covered: IntArray
+    by: IntArray
+
+
+def composed(fragments: Fragments, paints: IntArray, front: int, pixels: int) -> Composed:
+    """Fragments of few shapes in a picture of so many pixels, composed at once."""
+    if len(fragments) * _SPARSE < pixels:
+        return _mostly_alone(fragments, paints, front, pixels)
+    behind = _foremost(fragments, pixels)
+    some = fragments.only(np.flatnonzero(fragments.shares < 1))
+    some = some.only(np.flatnonzero(some.owners > behind[some.pixels]))
     by_pixel = slots(some, front)
-    above = by_pixel.composed(some.shares, sheet.paints[some.owners])
-    left[by_pixel.pixels], sums[by_pixel.pixels] = above
-    whole = np.flatnonzero(behind >= 0)
-    sums[whole] += left[whole].astype(np.int64) * sheet.paints[behind[whole]]
-    left[whole] = 0
-    seen = np.flatnonzero(left < WHOLE)
-    return _as_one(seen, sums[seen], left[seen], opacity)
+    left, sums = by_pixel.composed(some.shares, paints[some.owners])
+    under = behind[by_pixel.pixels]
+    sums += np.where(under < 0, 0, left.astype(np.int64) * paints[under])
+    left[under >= 0] = 0
+    behind[by_pixel.pixels] = -1
+    covered = np.flatnonzero(behind >= 0)
+    return Composed(by_pixel.pixels, *_shades(sums, left), covered, behind[covered])
+
+
+def _mostly_alone(fragments: Fragments, paints: IntArray, front: int, pixels: int) -> Composed:
+    """The same where most pixels have one fragment alone, which needs no sorting."""
+    every = np.arange(len(fragments), dtype=np.int32)
+    last = np.empty(pixels, np.int32)
+    last[fragments.pixels] = every
+    last[fragments.pixels[last[fragments.pixels] != every]] = -1
+    alone = last[fragments.pixels] >= 0
+    some, several = fragments.only(np.flatnonzero(alone)), fragments.only(np.flatnonzero(~alone))
+    by_pixel = slots(several, front)
+    left, sums = by_pixel.composed(several.shares, paints[several.owners])
+    colours, weights = _shades(sums, left)
+    none = np.empty(0, np.int64)
+    return Composed(
+        np.concatenate([by_pixel.pixels, some.pixels]),
+        np.concatenate([colours, paints[some.owners]]),
+        np.concatenate([weights, np.rint(WHOLE * some.shares)]),
+        none,
+        none,
+    )
 
 
 def bands(size: Size) -> Iterator[tuple[int, Size]]:
@@ -276,8 +300,8 @@ def _in_front(fragments: Fragments, pixels: int) -> IntArray:
     return np.flatnonzero(fragments.owners >= _foremost(fragments, pixels)[fragments.pixels])
 
 
-def _as_one(pixels: IntArray, sums: IntArray, left: Numbers, opacity: float) -> tuple[Fragments, IntArray]:
-    """What has been composed of some pixels, seen in part: a fragment for each, and their colours."""
+def _shades(sums: IntArray, left: Numbers) -> tuple[IntArray, Numbers]:
+    """What has been composed of some pixels as one: their colours, and how much each weighs."""
     weight = WHOLE - left
     colours, some = lanes(sums), np.flatnonzero(left)
     whole, sums = weight[some].astype(np.int64), sums[some]
@@ -285,8 +309,7 @@ def _as_one(pixels: IntArray, sums: IntArray, left: Numbers, opacity: float) -> 
     for lane in range(0, 3 * LANE, LANE):
         parts |= ((sums >> lane & (1 << LANE) - 1) + whole // 2) // whole << lane
     colours[some] = parts
-    shares = (weight * np.float32(opacity / WHOLE)).astype(np.float32)
-    return Fragments(np.arange(len(pixels)), pixels, shares), colours
+    return colours, weight
 
 
 class Stack:
@@ -311,7 +334,9 @@ class Stack:
         """What has been composed as one, seen in part: a fragment for each pixel, their colours, and the place above
         them."""
         pixels = np.flatnonzero(self.left < WHOLE)
-        return *_as_one(pixels, self.sums[pixels], self.left[pixels], opacity), len(pixels)
+        colours, weight = _shades(self.sums[pixels], self.left[pixels])
+        shares = weight * np.float32(opacity / WHOLE)
+        return Fragments(np.arange(len(pixels)), pixels, shares), colours, len(pixels)
 
     def over(self, background: int) -> IntArray:
         """The sums with a background behind all."""

@@ -453,10 +453,10 @@ def rounded(corners: FloatArray, margins: FloatArray) -> FloatArray:
     return result.reshape(len(corners), -1, 2)
 
 
-def polygons(corners: FloatArray, size: Size) -> Fragments:
+def polygons(corners: FloatArray, size: Size, begins: IntArray | None = None) -> Fragments:
     """Filled convex polygons of k corners each (n, k, 2), in order, later ones in front of others: a pixel is cut into
     ``_SLICES`` rows, of which it is known exactly how much of each lies inside. What is hidden by another of them is
-    left out."""
+    left out. Where they lie on several pictures, ``begins`` (n,) is the first pixel of that of each."""
     if not len(corners):
         return NOTHING
     first = np.clip(np.floor(corners[:, :, 1].min(axis=1)), 0, size[1]).astype(np.int64)
@@ -464,12 +464,13 @@ def polygons(corners: FloatArray, size: Size) -> Fragments:
     rows = np.maximum(last - first, 0)
     left, right = np.clip(_sides(corners, first, rows), 0, size[0])
     owner = np.repeat(np.arange(len(corners), dtype=np.int32), rows)
-    begin = np.arange(len(owner)) * size[0] + np.repeat((first - np.cumsum(rows) + rows) * size[0], rows)
+    corner = np.zeros(len(corners), np.int64) if begins is None else begins
+    begin = np.arange(len(owner)) * size[0] + np.repeat((first - np.cumsum(rows) + rows) * size[0] + corner, rows)
     low, high = np.floor(left.min(axis=0)).astype(np.int64), np.ceil(right.max(axis=0)).astype(np.int64)
     inner, outer = np.ceil(left.max(axis=0)).astype(np.int64), np.floor(right.min(axis=0)).astype(np.int64)
     inner = np.minimum(inner, high)
     outer = np.clip(outer, inner, high)
-    front = np.full(size[0] * size[1], -1, np.int32)
+    front = np.full(int(corner.max()) + size[0] * size[1], -1, np.int32)
     # owners ascend, and the last one stays
     front[_spans(begin + inner, outer - inner)] = np.repeat(owner, outer - inner)
     whole = np.flatnonzero(front >= 0)

@@ -12,30 +12,28 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from queue import SimpleQueue
 
+from neurovis_renderers.apart import FRAMES
 from neurovis_renderers.canvas import Pixels, paint
 from neurovis_renderers.lettering import warn_of_letters
 from neurovis_renderers.moving import Moving, Painter, TooDeepError
 from neurovis_spec.scene import Film, Progress, still
 
-#: Frames that a thread paints one after the other, so that they have much in common.
-_RUN = 4
-
 
 def frames(film: Film) -> Iterator[Pixels]:
     """The pictures of a film, each made shortly before it is asked for."""
     painters: SimpleQueue[Callable[[int], Pixels]] = SimpleQueue()
-    threads = max(1, min(_processors(), -(-film.frames // _RUN)))
+    threads = max(1, min(_processors(), -(-film.frames // FRAMES)))
     for paint_frame in _painters(film, threads):
         painters.put(paint_frame)
 
     def run(begin: int) -> list[Pixels]:
         paint_frame = painters.get()
         try:
-            return [paint_frame(frame) for frame in range(begin, min(begin + _RUN, film.frames))]
+            return [paint_frame(frame) for frame in range(begin, min(begin + FRAMES, film.frames))]
         finally:
             painters.put(paint_frame)
 
-    for pictures in _in_order(run, range(0, film.frames, _RUN), threads):
+    for pictures in _in_order(run, range(0, film.frames, FRAMES), threads):
         yield from pictures
 
 

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_renderers import coverage
-from neurovis_renderers.canvas import COVERED, Pixels, Stack, bands, layer, portions, slots
+from neurovis_renderers.apart import FRAMES, Laid, laid
+from neurovis_renderers.canvas import COVERED, Pixels, Stack, bands, portions, slots
 from neurovis_renderers.coverage import BoolArray, Fragments, Heads, Numbers, Size, Strokes
 from neurovis_renderers.sheet import LANE, WHOLE, Sheet, lanes, packed, packed_all
 from neurovis_spec.scene import (
@@ -43,7 +44,6 @@ _STEP = np.float32(1 / 64)
 _MUCH = 0.4
 #: Fragments that are kept of a band.
 MOST_KEPT = 6_000_000
-_NO_COLOURS: IntArray = np.empty(0, np.int64)
 _Words = npt.NDArray[np.uint32]
 #: How lines end, as a Film has it.
 _Ends = npt.NDArray[np.int8]
@@ -277,13 +277,10 @@ def _words(sums: IntArray) -> _Words:
     return result.astype(np.uint32)
 
 
-def _put_on(picture: _Words, fragments: Fragments, colours: IntArray) -> None:
-    """Draw a fragment a pixel, each of its own colour, in front of a picture."""
-    part = fragments.shares < 1
-    picture[fragments.pixels[~part]] = _bytes(colours[~part])
-    behind = _lanes_of(picture[fragments.pixels[part]])
-    weights = np.rint(fragments.shares[part] * WHOLE).astype(np.int64)
-    picture[fragments.pixels[part]] = _words(colours[part] * weights + behind * (WHOLE - weights))
+def _over(one: Laid, behind: _Words) -> _Words:
+    """What stands apart in front of the pixels that it lies over in part."""
+    weights = np.rint(one.fragments.shares * WHOLE).astype(np.int64)
+    return _words(one.colours * weights + _lanes_of(behind) * (WHOLE - weights))
 
 
 def _bytes(colours: IntArray) -> _Words:
@@ -316,6 +313,7 @@ class Painter:
         self._bands = [_Painted(moving, band) for band in moving.bands]
         self._colours = np.full(len(moving.sheet), -1, np.int64)
         self._halves = np.full((2, len(moving.sheet)), -2, np.float32)
+        self._run = -1
 
     def paint(self, frame: int) -> Pixels:
         """The picture, (height, width, 3)."""
@@ -323,13 +321,23 @@ class Painter:
         colours = moving.colours(frame)
         halves = np.stack(moving.halves(frame)) if moving.shaped.any() else self._halves
         recoloured, reshaped = colours != self._colours, moving.shaped & (halves != self._halves).any(axis=0)
-        apart = still(moving.apart, frame).groups if moving.apart_places else ()
+        self._lay(frame // FRAMES)
         rows = []
         for band in self._bands:
             band.update(colours, recoloured, halves, reshaped)
-            rows.append(band.with_apart(apart, colours))
+            rows.append(band.with_apart(frame % FRAMES, colours))
         self._colours, self._halves = colours, halves
         return rows[0] if len(rows) == 1 else np.concatenate(rows)
+
+    def _lay(self, run: int) -> None:
+        """Draw what stands apart, for all frames of a run."""
+        film, begin = self._moving.apart, run * FRAMES
+        if run == self._run or not self._moving.apart_places:
+            return
+        stills = [still(film, frame).groups for frame in range(begin, min(begin + FRAMES, film.frames))]
+        for band in self._bands:
+            band.lay(stills)
+        self._run = run
 
 
 class _Painted:
@@ -343,7 +351,9 @@ class _Painted:
         self._behind = band.behind[band.pixels]
         self._picture = _words(band.behind * WHOLE)
         self._new = True
-        self._apart = list[tuple[Group, Fragments, IntArray]]()
+        #: what stands apart, by the frame of a run; and each as it was in the last of these
+        self._apart = list[list[Laid]]()
+        self._last = list[tuple[Group, Laid]]()
 
     def update(self, colours: IntArray, recoloured: BoolArray, halves: Numbers, reshaped: BoolArray) -> None:
         """Draw anew what has changed."""
@@ -405,48 +415,54 @@ class _Painted:
             sums[:end] += colours[self._band.owners[at]] * self._weights[at]
         return sums
 
-    def with_apart(self, groups: tuple[Group, ...], colours: IntArray) -> Pixels:
-        """The picture with the groups that stand apart, (height, width, 3)."""
+    def lay(self, stills: list[tuple[Group, ...]]) -> None:
+        """Draw what stands apart, at the frames of a run; only what is not as it was before."""
+        band, density = self._band, self._moving.sheet.density
+        columns, last = list[list[Laid]](), list[tuple[Group, Laid]]()
+        for number in range(len(self._moving.apart_places)):
+            groups = [groups[number] for groups in stills]
+            before = [self._last[number][0] if self._last else None, *groups]
+            changed = [group != earlier for group, earlier in zip(groups, before, strict=False)]
+            new = [group for group, is_new in zip(groups, changed, strict=True) if is_new]
+            drawn = iter(laid(new, density, band.top, band.size) if new else ())
+            column = [self._last[number][1]] if self._last else []
+            for is_new in changed:
+                column.append(next(drawn) if is_new else column[-1])
+            columns.append(column[-len(groups) :])
+            last.append((groups[-1], column[-1]))
+        self._apart, self._last = [list(row) for row in zip(*columns, strict=True)], last
+
+    def with_apart(self, number: int, colours: IntArray) -> Pixels:
+        """The picture with the groups that stand apart, at a frame of the run, (height, width, 3)."""
         wide, high = self._band.size
-        self._apart = [self._drawn(number, group) for number, group in enumerate(groups)]
-        picture = self._picture
-        among = len(groups) - self._moving.last
-        touched = [fragments.pixels for _, fragments, _ in self._apart[:among] if len(fragments)]
-        if groups:
-            picture = picture.copy()
-        if touched:
-            marked = np.zeros(len(picture), bool)
-            marked[np.concatenate(touched)] = True
-            pixels = np.flatnonzero(marked)
-            picture[pixels] = _words(self._composed(pixels, colours, among))
-        for _, fragments, shades in self._apart[among:]:
-            _put_on(picture, fragments, shades)
-        return _three(picture).reshape(high, wide, 3)
+        apart = self._apart[number] if self._apart else []
+        among, picture, covered = len(apart) - self._moving.last, self._picture, list[tuple[IntArray, _Words]]()
 
-    def _drawn(self, number: int, group: Group) -> tuple[Group, Fragments, IntArray]:
-        """A group that stands apart: a fragment for each pixel, and its colours. What has not changed is kept."""
-        if number < len(self._apart) and self._apart[number][0] == group:
-            return self._apart[number]
-        band, sheet = self._band, Sheet((replace(group, opacity=1.0),), self._moving.sheet.density)
-        low, above = sheet.extent
-        corner = np.array([0, band.top])
-        left, first = np.clip(low - corner - 2, 0, band.size).astype(np.int64).tolist()
-        right, last = np.clip(above - corner + 3, 0, band.size).astype(np.int64).tolist()
-        if right <= left or last <= first:
-            return group, coverage.NOTHING, _NO_COLOURS
-        size = right - left, last - first
-        fragments, colours = layer(sheet, (left, band.top + first), size, group.opacity)
-        owners = np.full(len(fragments), self._moving.apart_places[number])
-        row, column = np.divmod(fragments.pixels, size[0])
-        pixels = (row + first) * band.size[0] + column + left
-        return group, Fragments(owners, pixels, fragments.shares), colours
+        def put(pixels: IntArray, words: _Words) -> None:
+            covered.append((pixels, picture[pixels]))
+            picture[pixels] = words
 
-    def _composed(self, pixels: IntArray, colours: IntArray, among: int) -> IntArray:
-        """The sums of some pixels, with the first so many of what stands apart."""
+        some = [one.as_fragments(place) for one, place in zip(apart[:among], self._moving.apart_places, strict=False)]
+        if any(len(fragments) for fragments, _ in some):
+            put(*self._composed(some, colours))
+        for one in apart[among:]:
+            put(one.covered, _bytes(one.covering))
+            put(one.fragments.pixels, _over(one, picture[one.fragments.pixels]))
+        result = _three(picture).reshape(high, wide, 3)
+        for pixels, words in reversed(covered):
+            picture[pixels] = words
+        return result
+
+    def _composed(self, apart: list[tuple[Fragments, IntArray]], colours: IntArray) -> tuple[IntArray, _Words]:
+        """The pixels in which some of what stands apart is seen, and how they look, with all that lies there."""
+        marked = np.zeros(len(self._picture), bool)
+        for fragments, _ in apart:
+            marked[fragments.pixels] = True
+        pixels = np.flatnonzero(marked)
         band, front = self._band, len(self._moving.sheet)
         stack = Stack(len(pixels))
-        parts = [Fragments(f.owners, np.searchsorted(pixels, f.pixels), f.shares) for _, f, _ in self._apart[:among]]
-        paints = [shades for _, _, shades in self._apart[:among]]
+        parts = [replace(one, pixels=np.searchsorted(pixels, one.pixels)) for one, _ in apart]
+        paints = [shades for _, shades in apart]
         numbers = band.numbers[pixels]
         places = np.argsort(numbers)
         places = places[np.searchsorted(numbers[places], 0) :]
@@ -454,5 +470,4 @@ class _Painted:
             parts.append(Fragments(band.owners[at], places[:end], self._shares[at]))
             paints.append(colours[band.owners[at]])
         stack.add(coverage.joined(parts, coverage.NOTHING), np.concatenate(paints), front)
-        result: IntArray = stack.sums + stack.left.astype(np.int64) * band.behind[pixels]
-        return result
+        return pixels, _words(stack.sums + stack.left.astype(np.int64) * band.behind[pixels])

@@ -95,6 +95,11 @@ class Sheet:
         self.colours: list[int] = []
         #: where each shape of a group begins in the order: ``places[group][shape]``
         self.places: list[list[int]] = []
+        #: where each group begins in the order
+        self.firsts: list[int] = []
+        #: of shapes on several pictures the first pixel of that of each, and where that lies on the sheet, by its place
+        self._begins: IntArray | None = None
+        self._corners: IntArray = np.empty((0, 2), np.int64)
         #: groups with an opacity of their own: first and last place, opacity
         self.veiled: list[tuple[int, int, float]] = []
         self._splines: list[tuple[int, Spline]] = []
@@ -106,6 +111,7 @@ class Sheet:
         self._others: list[tuple[int, int, Shape]] = []
         for group in groups:
             begin = len(self.colours)
+            self.firsts.append(begin)
             if group.id in left_out:
                 self.places.append([begin])
                 self.colours.append(0)
@@ -230,6 +236,22 @@ class Sheet:
         assert result.pieces is shared[0]
         return result
 
+    def on_pages(self, page_of: IntArray, corners: IntArray, size: Size) -> Sheet:
+        """The same with shapes on pictures of one size, one after the other: which each is on, by its place, and which
+        pixel of the sheet is the first of each picture, (pictures, 2)."""
+        result = copy(self)
+        shifts = corners[page_of]
+        moved = {}
+        for name in ("_head_arrays", "_disc_arrays"):
+            places, table = getattr(self, name)
+            moved[name] = places, np.concatenate([table[:, :2] - shifts[places], table[:, 2:]], axis=1)
+        places, outlines = self._polygon_arrays
+        moved["_polygon_arrays"] = places, outlines - shifts[places][:, None]
+        by = shifts[self.pieces.owners]
+        pieces = replace(self.pieces, starts=self.pieces.starts - by, ends=self.pieces.ends - by)
+        result.__dict__.update(moved, pieces=pieces, _corners=shifts, _begins=page_of * (size[0] * size[1]))
+        return result
+
     def stroke_shares(self, made: Strokes) -> Numbers:
         """What strokes cover, as wide as their shapes are."""
         shares: Numbers = made.shares(self.halves[made.owners]) * self.opacities[made.owners]
@@ -312,7 +334,8 @@ class Sheet:
         tips = table[:, :2] - corner
         near = _reaches(tips[:, 1], table[:, 4] + table[:, 5], size)
         found = coverage.heads(tips[near], table[near, 2:4], table[near, 4], table[near, 5], size)
-        return replace(found, owners=places[near][found.owners])
+        owners = places[near][found.owners]
+        return replace(found, owners=owners, pixels=self._on_page(found.pixels, owners))
 
     def solid(self, low: int, high: int, corner: Size, size: Size) -> Fragments:
         """The fragments of all but solid splines and heads, of shapes ``low`` to ``high``, in pixels from a ``corner``
@@ -322,14 +345,17 @@ class Sheet:
         if len(places):
             near = _reaches(table[:, 1] - corner[1], table[:, 2] + table[:, 3], size)
             places, centres, radii, widths = places[near], table[near, :2] - corner, table[near, 2], table[near, 3]
-            found.append(_owned(coverage.discs(centres, radii, size), places))
-            found.append(_owned(coverage.rings(centres, radii, widths, size), places + 1))
+            found.append(self._owned(coverage.discs(centres, radii, size), places))
+            found.append(self._owned(coverage.rings(centres, radii, widths, size), places + 1))
         places, corners = _between(*self._polygon_arrays, low, high)
         if len(places):
-            found.append(_owned(coverage.polygons(corners - corner, size), places))
+            begins = None if self._begins is None else self._begins[places]
+            some = coverage.polygons(corners - corner, size, begins)
+            found.append(replace(some, owners=places[some.owners]))
         for place, end, shape in self._others:
             if place < high and end > low:
-                found += [_owned(part, place + number) for number, part in enumerate(self._other(shape, corner, size))]
+                parts = self._other(shape, self._corner_of(place, corner), size)
+                found += [self._owned(part, np.arange(place + number, end)) for number, part in enumerate(parts)]
         made = coverage.joined(found, coverage.NOTHING)
         return made.only((made.owners >= low) & (made.owners < high)) if low or high < len(self) else made
 
@@ -345,32 +371,48 @@ class Sheet:
         lines = (np.minimum(length + 2 * halves, sum(size)) * 3 * halves).sum()
         return whole * size[0] * size[1] + letters * self.density**2 + float(round_ + lines)
 
-    @cached_property
-    def extent(self) -> tuple[FloatArray, FloatArray]:
-        """The least and the greatest place at which anything may be seen, (2,) each, in pixels."""
-        lows, highs = [np.full((1, 2), np.inf)], [np.full((1, 2), -np.inf)]
+    def extents(self, page_of: IntArray, pages: int) -> tuple[FloatArray, FloatArray]:
+        """The least and the greatest place at which anything may be seen of the shapes of each page, by the page that
+        each is on (by its place); (pages, 2) each, in pixels."""
+        low, high = np.full((pages, 2), np.inf), np.full((pages, 2), -np.inf)
 
-        def reach(points: FloatArray, beyond: FloatArray | float) -> None:
-            lows.append(points - beyond)
-            highs.append(points + beyond)
+        def reach(places: IntArray, least: FloatArray, most: FloatArray) -> None:
+            np.minimum.at(low, page_of[places], least)
+            np.maximum.at(high, page_of[places], most)
 
         if self._polygons:
-            reach(self._polygon_arrays[1].reshape(-1, 2), 0.0)
-        if self._discs:
-            table = self._disc_arrays[1]
-            reach(table[:, :2], (table[:, 2] + table[:, 3])[:, None])
-        if self._heads:
-            table = self._head_arrays[1]
-            reach(table[:, :2], (table[:, 4] + table[:, 5])[:, None])
+            places, corners = self._polygon_arrays
+            reach(places, corners.min(axis=1), corners.max(axis=1))
+        for places, table, beyond in (
+            (*self._disc_arrays, self._disc_arrays[1][:, 2:4]),
+            (*self._head_arrays, self._head_arrays[1][:, 4:6]),
+        ):
+            around = beyond.sum(axis=1)[:, None]
+            reach(places, table[:, :2] - around, table[:, :2] + around)
         if self._splines:
             halves = self.halves[self.pieces.owners].astype(float)
-            low, high = coverage.extent(self.pieces, halves)
-            lows.append(low)
-            highs.append(high)
-        for _, _, shape in self._others:
-            for corner, beyond in _reach(shape):
-                reach(np.array([corner]) * self.density, np.array([beyond]) * self.density)
-        return np.concatenate(lows).min(axis=0), np.concatenate(highs).max(axis=0)
+            reach(self.pieces.owners, *coverage.extent(self.pieces, halves))
+        others = [(place, *corner) for place, _, shape in self._others for corner in _reach(shape)]
+        if others:
+            corners, around = (np.array([each[part] for each in others]) * self.density for part in (1, 2))
+            reach(np.array([place for place, _, _ in others]), corners - around, corners + around)
+        return low, high
+
+    def _corner_of(self, place: int, corner: Size) -> Size:
+        """The first pixel of the picture that a shape is on."""
+        if self._begins is None:
+            return corner
+        x, y = self._corners[place].tolist()
+        return x + corner[0], y + corner[1]
+
+    def _owned(self, part: Fragments, places: IntArray) -> Fragments:
+        """Fragments of shapes with these places."""
+        owners = places[part.owners]
+        return Fragments(owners, self._on_page(part.pixels, owners), part.shares)
+
+    def _on_page(self, pixels: IntArray, owners: IntArray) -> IntArray:
+        """Pixels of shapes among those of all pictures."""
+        return pixels if self._begins is None else pixels + self._begins[owners]
 
     def _other(self, shape: Shape, corner: Size, size: Size) -> list[Fragments]:
         density = self.density
@@ -421,7 +463,8 @@ class Sheet:
         if not len(pieces):
             return coverage.NO_STROKES
         pieces = replace(pieces, starts=pieces.starts - corner, ends=pieces.ends - corner)
-        return coverage.strokes(pieces, self.halves[pieces.owners].astype(float), size, hidden)
+        found = coverage.strokes(pieces, self.halves[pieces.owners].astype(float), size, hidden)
+        return replace(found, pixels=self._on_page(found.pixels, found.owners))
 
 
 def _reach(shape: Shape) -> list[tuple[Point, Point]]:
@@ -449,8 +492,3 @@ def _reaches(rows: FloatArray, reach: FloatArray, size: Size) -> BoolArray:
     """Which may reach into the picture, from the row that they are in."""
     result: BoolArray = (rows + reach > -2) & (rows - reach < size[1] + 2)
     return result
-
-
-def _owned(part: Fragments, places: IntArray | int) -> Fragments:
-    owners = part.owners + places if isinstance(places, int) else places[part.owners]
-    return replace(part, owners=owners)
