@@ -52,7 +52,7 @@ OPTIONS = {
     "sweep": "--over --metric --steps --set --input --backend --jobs --scheduler --output",
     "animate": "--output --steps --from --fps --recording --input --theme --engine",
     "export": "--to --output --float --from --set",
-    "live": "--recording --from --watch --host --port --viewers --open --theme --engine --backend --set",
+    "live": "--recording --from --watch --host --port --viewers --open --view --theme --engine --backend --set",
     "analyze": "--output --recording --of --from --to --threshold --bins --trials --theme --set --input",
     "ros": "run view play legacy export", "explain": "", "docs": "", "lsp": "", "schema": "",
 }  # fmt: skip

@@ -49,12 +49,10 @@ async def at_hand(
         spec.write_text(spec.read_text().replace("direction: down}", f"direction: down, {pins}}}"))
     compiled = nv.compile(spec)
     show = Show()
-    hub, loop = Hub(asyncio.get_running_loop(), REQUESTS), asyncio.get_running_loop()
+    hub = Hub(asyncio.get_running_loop(), REQUESTS)
     run = Run(*show.stage(compiled), hub.show, lambda: hub.watched)
     written = Written(spec, lambda text: nv.compile_text(text, file=str(spec), folder=spec.parent))
-    desk = Desk(
-        compiled, None, show.view, run, lambda text: loop.call_soon_threadsafe(hub.tell, text, "placed"), written
-    )
+    desk = Desk(compiled, None, show.view, run, hub.keep_soon, written)
     sock = listen("127.0.0.1", 0)
     access = Access("127.0.0.1", sock.getsockname()[1], viewers=True)
     server = Server(access, hub, run, desk)

@@ -55,6 +55,7 @@ def test_every_message_and_limit_is_documented() -> None:
         "body",
         "measured",
         "undefined",
+        "views",
     }
     assert set(re.findall(r'\{"type": "(\w+)"', text)) == {*MESSAGES, *sent}
     for speed in SPEEDS:

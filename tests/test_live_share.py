@@ -5,14 +5,20 @@ from __future__ import annotations
 import asyncio
 import json
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 from test_live_browser import STEP, pause, shown
+from test_live_hand import at_hand
 from test_live_strips import JOIN, SCRUB, TYPED
+
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.live.saved_views import file_beside, views_in
 
 pytestmark = pytest.mark.browser
 
 CURVES = "[...document.querySelectorAll('#strips .of')].map((one) => one.title).filter(Boolean)"
+NAME = "after the lesion"
 VIEW = "new URLSearchParams(%s).get('view').split(' ').map((one) => (+one).toFixed(2))"
 COPIES = """navigator.clipboard.writeText = async (text) => { window.copied = text };
 navigator.clipboard.write = async ([item]) => { window.blob = await item.getType('image/png') }"""
@@ -114,5 +120,67 @@ def test_a_link_goes_to_its_branch_and_says_where_it_cannot(tmp_path: Path) -> N
             await opened.call("Page.navigate", url="about:blank")
             await opened.call("Page.navigate", url=str(second).replace("branch=1", "branch=7"))
             await opened.until(f"{refusal.format('is no more')} && {STEP} == 21")
+
+    asyncio.run(main())
+
+
+def test_a_view_is_saved_by_name_and_gone_to_in_windows_of_other_sizes(tmp_path: Path) -> None:
+    view = "new URLSearchParams(location.hash.slice(1)).get('view')"
+    there = "[...document.querySelectorAll('#views button')].map((one) => one.textContent)"
+    go = "document.querySelector('#views button').click()"
+
+    async def main() -> None:
+        async with at_hand(tmp_path) as (opened, desk, spec):
+            file = file_beside(spec)
+            await opened.until(f"{STEP} > 30")
+            step = await pause(opened)
+            await opened.ask("[...document.querySelectorAll('#strips .pin')].slice(1).forEach((one) => one.click())")
+            for name in ("C1", "K2", "rms(T - O, last=9)"):
+                await opened.ask(TYPED.format(f"'{name}'"))
+            await opened.until(f"{CURVES}.length == 4")
+            await opened.ask(JOIN.format(1, "with K2"))
+            await opened.ask("{ const s = document.querySelector('#speed'); s.value = '2'; s.onchange() }")
+            await opened.ask("document.activeElement.blur()")
+            for key in ("+", "+", "+", "l"):
+                await opened.key(key)
+            await opened.until("location.hash.includes('view=') && location.hash.includes('speed=2')")
+            curves = await opened.ask(CURVES)
+            assert isinstance(curves, list)
+            await opened.key("t")
+            await opened.ask(f"document.querySelector('#viewname').value = {json.dumps(NAME)}")
+            await opened.ask("document.querySelector('#keep').requestSubmit()")
+            await opened.until(f"{there}.join() == {json.dumps(NAME)}")
+            await opened.ask("document.querySelector('#keep').scrollIntoView()")
+            (tmp_path / "saved.png").write_bytes(await opened.shot())
+            findings = Findings()
+            (saved,) = views_in(file, desk.placed.compiled.network, findings).values()
+            assert not findings.sorted()
+            assert (saved.step, saved.speed, saved.theme, saved.closed) == (step, "2", "", ())
+            assert saved.camera is not None
+            assert saved.curves == ("O over T", "C1 with K2", "rms(T - O, last=9)")
+
+            await opened.key("0")
+            await opened.ask("document.querySelector('#step').click()")
+            await opened.ask("document.querySelector('#strips .pin').click()")
+            await opened.until(f"{STEP} == {step} + 1 && !location.hash.includes('view=')")
+            await opened.size(900, 700)
+            await opened.ask(go)
+            await opened.until(f"{STEP} == {step} && location.hash.includes('view=')")
+            assert await opened.ask(CURVES) == curves
+            await opened.until(f"{view} == '{' '.join(f'{one:.6g}' for one in saved.camera)}'")
+            await opened.ask("document.querySelector('#undo').click()")
+            await opened.until(f"{STEP} == {step} + 1 && !location.hash.includes('view=')")
+            assert await opened.ask(CURVES) == curves[1:]
+
+            file.write_text(file.read_text().replace("C1", "C99"))
+            url = str(await opened.ask("location.href")).partition("#")[0]
+            for wanted in (NAME, "nothing"):
+                await opened.call("Page.navigate", url="about:blank")
+                await opened.call("Page.navigate", url=f"{url}#saved={quote(wanted)}")
+                if wanted == NAME:
+                    await opened.until(f"{STEP} == {step} && location.hash.includes('view=')")
+                    assert await opened.ask(CURVES) == curves, "the file is read when a view is saved"
+                else:
+                    await opened.until("document.querySelector('#refusal')?.textContent.includes('no view nothing')")
 
     asyncio.run(main())

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
+from urllib.parse import quote
 
 import click
 
@@ -58,12 +59,13 @@ class Played:
 
 @dataclass(frozen=True)
 class Door:
-    """Where the page is served, and who is shown in."""
+    """Where the page is served, who is shown in, and the view that is opened."""
 
     host: str
     port: int
     viewers: bool
     browse: bool
+    view: str | None
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,7 @@ door_options: Final = as_one(
     click.option("--port", type=click.IntRange(0, 65535), default=0, metavar="P", help="Default: one that is free."),
     click.option("--viewers", is_flag=True, help="Print a second URL, on standard error, for those who only look on."),
     click.option("--open", "browse", is_flag=True, help="Open the page in the browser."),
+    click.option("--view", metavar="NAME", help="Open the page where it stood when this view was saved in it."),
 )
 
 
@@ -102,6 +105,7 @@ door_options: Final = as_one(
         "neurovis live",
         "neurovis live first.yaml",
         "neurovis live first.yaml --watch --open",
+        'neurovis live first.yaml --view "after the lesion"',
         "neurovis live first.yaml --recording first.npz",
         "neurovis live first.yaml --from first.npz --viewers",
         "neurovis live first.yaml --from first.npz --only weights",
@@ -131,7 +135,7 @@ def command(
     check_only(played.only, played.start)
     spec = specs[0] if specs else None
     if spec is None:
-        _check_alone(played, watch, settings)
+        _check_alone(played, door.view, watch, settings)
     if watch and spec == "-":
         raise click.UsageError("standard input cannot be watched: give the path of a spec")
     if find_spec("aiohttp") is None:
@@ -147,17 +151,37 @@ def command(
 
     network, recording = _network(spec, played, settings, watch or played.start is not None)
     in_place = None if spec == "-" or _is_recording(spec) else Written(Path(spec), compiler_in_place(spec, settings))
+    if door.view is not None:
+        _check_view(door.view, spec, in_place, network)
     begin = Beginning(recording_of(played.start), played.only is not None)
     show = Show(recording, begin, drawn.theme, drawn.engine, drawn.backend)
     _show(network, show, in_place, Edited(Path(spec), compiler(spec, settings)) if watch else None, door)
 
 
-def _check_alone(played: Played, watch: bool, settings: dict[str, float | str]) -> None:
+def _check_alone(played: Played, view: str | None, watch: bool, settings: dict[str, float | str]) -> None:
     """Refuse what only means something of one spec."""
-    given = {"--recording": played.recording, "--from": played.start, "--watch": watch, "--set": settings}
+    recorded = {"--recording": played.recording, "--from": played.start}
+    given: dict[str, object] = {**recorded, "--view": view, "--watch": watch, "--set": settings}
     for option, value in given.items():
         if value:
             raise click.UsageError(f"{option} is of a spec: give one, or leave the option out for the gallery")
+
+
+def _check_view(name: str, spec: str, in_place: Written | None, network: CompiledNetwork) -> None:
+    """Refuse a view that is not in the file, or a file that is wrong; tell what of it is left out."""
+    from neurovis_spec.diagnostics import Findings, show_text
+    from neurovis_spec.likeness import suggest
+    from neurovis_spec.live.saved_views import file_beside, views_in
+
+    if in_place is None:
+        raise click.UsageError(f"'{spec}' has no file of views: --view needs the path of a spec")
+    path, findings = file_beside(in_place.path), Findings()
+    views = views_in(path, network.network, findings)
+    findings.check()
+    if name not in views:
+        raise fault(f"there is no view '{name}' in {path}", suggest(name, views, "views") or "save one in the page")
+    if told := findings.sorted():
+        click.echo(show_text(told, findings.sources), err=True)
 
 
 def _show_gallery(drawn: Drawn, door: Door) -> None:
@@ -227,14 +251,15 @@ def announcing(access: Access, door: Door) -> Callable[[], None]:
     """What tells where the page is."""
 
     def announce() -> None:
-        click.echo(access.url())
+        url = access.url() + ("" if door.view is None else f"#saved={quote(door.view)}")
+        click.echo(url)
         sys.stdout.flush()
         if door.viewers:
             click.echo(f"viewers: {access.url(owner=False)}", err=True)
         if door.browse:
             import webbrowser
 
-            webbrowser.open(access.url())
+            webbrowser.open(url)
 
     return announce
 

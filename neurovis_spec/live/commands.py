@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
 from neurovis_spec.layout.model import Point
+from neurovis_spec.live.saved_views import SavedView
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.scene.gains import Gains, Scale
 
@@ -230,6 +231,14 @@ class Fetch:
     theme: str = ""
 
 
-Request: TypeAlias = PlaceNeuron | Unplace | Save | Write | Fetch
+@dataclass(frozen=True, slots=True)
+class Keep:
+    """Keep where a page stands, by a name, in the file of views beside the spec."""
+
+    name: str
+    view: SavedView
+
+
+Request: TypeAlias = PlaceNeuron | Unplace | Save | Write | Fetch | Keep
 #: the messages that ask for them
-REQUESTS: Final = frozenset(("place", "unplace", "save", "write", "fetch"))
+REQUESTS: Final = frozenset(("place", "unplace", "save", "write", "fetch", "keep"))

@@ -16,9 +16,9 @@ from threading import Condition, RLock, Thread
 from typing import Final, TypeAlias, TypeVar
 
 from neurovis_spec.compilation import Compilation
-from neurovis_spec.diagnostics import SpecError, show_text
+from neurovis_spec.diagnostics import Findings, SpecError, show_text
 from neurovis_spec.layout.model import Layout
-from neurovis_spec.live.commands import STILLS, Appearance, Fetch, PlaceNeuron, Request, Save, Unplace, Write
+from neurovis_spec.live.commands import STILLS, Appearance, Fetch, Keep, PlaceNeuron, Request, Save, Unplace, Write
 from neurovis_spec.live.pins import Compile, File, Placed, Saving, SavingError, placed, saving
 from neurovis_spec.live.protocol import (
     file_message,
@@ -27,8 +27,10 @@ from neurovis_spec.live.protocol import (
     placed_message,
     refused_message,
     saving_message,
+    views_message,
 )
 from neurovis_spec.live.run import Run, Stage
+from neurovis_spec.live.saved_views import file_beside, keep, views_in
 from neurovis_spec.live.saving import film, picture, recording, steps_for, told_by
 from neurovis_spec.live.source import Source, SourceError
 from neurovis_spec.live.turns import Turned
@@ -86,6 +88,7 @@ class Desk:
     def start(self) -> None:
         """Begin."""
         self._say()
+        self._say_views()
         self._thread.start()
 
     def end(self) -> None:
@@ -129,6 +132,7 @@ class Desk:
         self._view, self._saving = None, None
         self._before.clear()
         self._say()
+        self._say_views()
 
     def _work(self) -> None:
         while True:
@@ -170,6 +174,9 @@ class Desk:
                 answer(saving_message(names, self._saving.diff, written=False, into=request.into))
             case Write():
                 self._write(answer)
+            case Keep():
+                keep(file_beside(self._written().path), request.name, request.view)
+                self._say_views()
             case Fetch(what="yaml"):
                 file = self._with_events()[1]
                 answer(file_message(file.path.name, file.after.encode()))
@@ -257,6 +264,13 @@ class Desk:
 
         self._run.change(change, lambda reason: answer(refused_message(reason)))
         self._say()
+
+    def _say_views(self) -> None:
+        """Tell everybody which views are saved, where they can be."""
+        if self._spec is not None:
+            path, findings = file_beside(self._spec.path), Findings()
+            views = views_in(path, self._placed.compiled.network, findings)
+            self._tell(views_message(path.name, views, show_text(findings.sorted(), findings.sources)))
 
     def _say(self) -> None:
         """Tell everybody what is put by hand."""

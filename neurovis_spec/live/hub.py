@@ -10,6 +10,7 @@ desk; what is refused is told.
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import math
 import time
@@ -118,7 +119,7 @@ class Client:
 
 class Hub:
     """The clients of a run. ``takes`` are the messages that are taken besides those that its source takes. All methods
-    but ``show``, ``watched``, ``refuse``, ``answer`` and ``tell_soon`` are called on the event loop."""
+    but ``show``, ``watched``, ``refuse``, ``answer``, ``tell_soon`` and ``keep_soon`` are called on the event loop."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, takes: frozenset[str] = frozenset()) -> None:
         self._loop, self._takes = loop, takes
@@ -199,6 +200,10 @@ class Hub:
     def tell_soon(self, text: str, keep: str = "") -> None:
         """``tell``, from any thread."""
         self._call(self.tell, text, keep)
+
+    def keep_soon(self, text: str) -> None:
+        """Tell all, and those who come later until there is another text of its type; from any thread."""
+        self.tell_soon(text, json.loads(text)["type"])
 
     def _call(self, what: Callable[..., None], *values: object) -> None:
         """Have the loop call something, if it still runs."""

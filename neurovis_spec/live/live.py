@@ -159,14 +159,11 @@ async def serve_until(
     hub = Hub(loop, REQUESTS)
     run = Run(*stage, hub.show, lambda: hub.watched, lambda reason: hub.tell_soon(refused_message(reason)))
 
-    def told(kind: str) -> Tell:
-        return lambda text: hub.tell_soon(text, kind)
-
-    at_desk = desk(run, told("placed"))
+    at_desk = desk(run, hub.keep_soon)
     server = Server(access, hub, run, at_desk)
     threads: list[Run | Desk | Watch] = [run, at_desk]
     if edits is not None:
-        threads.append(edits(run, told("findings"), at_desk))
+        threads.append(edits(run, hub.keep_soon, at_desk))
     await server.start(sock)
     try:
         for thread in threads:

@@ -36,6 +36,7 @@ from neurovis_spec.live.commands import (
     Fetch,
     Forget,
     Into,
+    Keep,
     Loop,
     Measure,
     Pause,
@@ -62,6 +63,7 @@ from neurovis_spec.live.futures import Future
 from neurovis_spec.live.held import KINDS
 from neurovis_spec.live.history import Bins, Range
 from neurovis_spec.live.run import Status
+from neurovis_spec.live.saved_views import SavedView
 from neurovis_spec.live.saving import MOST_SECONDS
 from neurovis_spec.live.source import Drawn, Reach
 from neurovis_spec.live.sums import SumArray
@@ -294,6 +296,11 @@ def saving_message(files: Sequence[str], diff: str, written: bool, into: Into = 
     return _text("saving", files=list(files), diff=diff, written=written, into=into)
 
 
+def views_message(file: str, views: Mapping[str, SavedView], findings: str) -> str:
+    """The views that are saved, in which file, and what is wrong with that, as ``validate`` shows it."""
+    return _text("views", file=file, views={name: asdict(view) for name, view in views.items()}, findings=findings)
+
+
 def making_message(done: int, total: int) -> str:
     """How far a file is that was asked for."""
     return _text("making", done=done, total=total)
@@ -465,6 +472,44 @@ def _speed(value: object) -> float:
     return SPEEDS[value]
 
 
+def _view(value: object) -> SavedView:
+    if not isinstance(value, dict) or set(value) != set(SavedView.__slots__):
+        raise ProtocolError("all of a view is wanted")
+    _speed(value["speed"])
+    return SavedView(
+        step=_whole(0, _MOST)(value["step"]),
+        speed=str(value["speed"]),
+        camera=_camera(value["camera"]),
+        curves=_texts(value["curves"]),
+        theme=_theme(value["theme"]),
+        closed=_texts(value["closed"]),
+    )
+
+
+def _camera(value: object) -> tuple[float, float, float] | None:
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 3:
+        raise ProtocolError("a camera is wanted")
+    zoom, x, y = (_number(number) for number in value)
+    if zoom <= 0:
+        raise ProtocolError("a camera is wanted")
+    return zoom, x, y
+
+
+def _texts(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list) or len(value) > _MANY:
+        raise ProtocolError(f"at most {_MANY} texts are wanted")
+    return tuple(_name(one) for one in value)
+
+
+def _view_name(value: object) -> str:
+    name = _called(value)
+    if not name:
+        raise ProtocolError("a name is wanted")
+    return name
+
+
 def _theme(value: object) -> str:
     if not isinstance(value, str) or (value and value not in THEMES):
         raise ProtocolError(f"a theme is wanted: {', '.join(THEMES)}, or none")
@@ -603,6 +648,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "unplace": ({}, Unplace),
     "save": ({"into": _one_of(*get_args(Into))}, Save),
     "write": ({}, Write),
+    "keep": ({"name": _view_name, "view": _view}, Keep),
     "fetch": ({"what": _one_of(*get_args(What)), "seconds": _seconds}, Fetch),
 }
 #: Members that a message need not have.

@@ -85,7 +85,7 @@ class Rooms:
             self._rooms.pop(number, None)  # who asks anew tries anew
             return
         run = Run(*stage, hub.show, lambda: hub.watched, lambda reason: hub.tell_soon(refused_message(reason)))
-        room.desk = desk(run, lambda text: hub.tell_soon(text, "placed"))
+        room.desk = desk(run, hub.keep_soon)
         room.run, room.reception = run, Reception(hub, run, room.desk)
         hub.tell(findings_message("", errors=False), "findings")
         run.start()

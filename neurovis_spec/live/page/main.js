@@ -37,6 +37,7 @@ import { Strips } from './strips.js';
 import { told } from './told.js';
 import { Turning } from './turning.js';
 import { Undo } from './undo.js';
+import { Views } from './views.js';
 import { Zoom } from './zoom.js';
 
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('picture'));
@@ -230,6 +231,7 @@ const link = new Link({
       strips.owner = message.owner;
       strips.measures(message.measures);
       share.status();
+      views.status();
     } else if (message.type === 'values') attention.take(message);
     else if (message.type === 'body') body.use(message.skeleton, message.start);
     else if (message.type === 'findings') controls.found(message);
@@ -242,6 +244,7 @@ const link = new Link({
       placing.saving(message);
       if (message.written) controls.tell(`saved ${message.files.join(', ')}`);
     } else if (message.type === 'measured') measuring.take(message);
+    else if (message.type === 'views') views.take(message);
     else if (message.type === 'making') share.making(message.done, message.total);
     else if (message.type === 'refused') {
       share.made();
@@ -288,6 +291,7 @@ const share = new Share(link, camera, strips, attention, controls, body, redraw,
   refusal.tell(words),
 );
 const saves = new Saves(link, body, (done, total) => share.making(done, total), part);
+const views = new Views(share, zoom, turning.appearance, undo, redraw, part);
 
 /** Show the matrix in place of the picture, or the picture. @param {boolean} asMatrix */
 function choose(asMatrix) {
@@ -398,9 +402,9 @@ function help() {
 }
 part('help').onclick = help;
 part('unpresent').onclick = () => share.present();
-const views = { toggle: () => choose(!matrix) };
-part('matrix').onclick = () => views.toggle();
-undo.follow(views, 'the matrix of the weights');
+const matrices = { toggle: () => choose(!matrix) };
+part('matrix').onclick = () => matrices.toggle();
+undo.follow(matrices, 'the matrix of the weights');
 undo.follow(turning, 'the panel for turning');
 undo.follow(outline, 'the outline');
 undo.follow(body, 'the panel of the body');
@@ -429,7 +433,7 @@ Object.assign(controls.keys, {
   t: ['open or close the panel of parameters', () => turning.toggle()],
   y: ['open or close the panel of the body', () => body.toggle()],
   i: ['fold or unfold the legend', () => legend.toggle()],
-  m: ['the matrix of the weights in place of the picture, and back', () => views.toggle()],
+  m: ['the matrix of the weights in place of the picture, and back', () => matrices.toggle()],
   g: ['each group as one node, with the pathways between them, and back', () => turning.appearance.toggle()],
   f: ['present: the picture and the curves alone, and back', () => share.present()],
   c: ['add a curve by its name, or by a measure', () => measuring.toggle()],

@@ -55,7 +55,9 @@ import { isStill } from './camera.js';
  *   learning: Object<string, boolean | null>, turned: Turned[], copied: string, events: number[], appearance: Gains, backend: string, futures: Future[], dropped: number, current: number, branch: string, compared: number | null, measures: {number: number, text: string}[], loop: number[] | null}} Status */
 /** What is not finite: the first, since which step, or an earlier one that is not known, and how many are; '' where nothing is.
  * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
-/** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
+/** Where a page stood; null of what it says nothing. @typedef {{step: number | null, speed: string | null, camera: number[] | null, curves: string[] | null,
+ *   theme: string | null, closed: string[] | null}} SavedView */
+/** @typedef {Status | {type: 'views', file: string, views: Object<string, SavedView>, findings: string} | {type: 'values', step: number, values: Object<string, number | null>}
  *   | {type: 'body', skeleton: Skeleton | null, start: number[]}
  *   | {type: 'making', done: number, total: number}
  *   | {type: 'findings', text: string, errors: boolean}

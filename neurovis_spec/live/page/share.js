@@ -15,8 +15,9 @@ import { PINS } from './strips.js';
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./strips.js').Strips} Strips */
 
-/** How often the address is brought up to date, in milliseconds; how long it is told that something was copied. */
-const PACE = 500,
+/** Pixels within which the picture is where it is as a whole; how often the address is brought up to date, in milliseconds; how long it is told that something was copied. */
+const HALF = 0.5,
+  PACE = 500,
   TOLD = 1500;
 /** What parts an item from what of it is shown, and items in one strip: no name has them; and what stands before an item that
  * is joined, and before one that it is drawn against: no name begins so. */
@@ -42,6 +43,8 @@ export class Share {
     this.redraw = redraw;
     this.tell = tell;
     this.branches = branches;
+    /** goes to the view that the page was opened with */
+    this.opens = (/** @type {string} */ _) => {};
     /** the curves that the page began with */
     this.begun = '';
     this.isBegun = false;
@@ -174,13 +177,40 @@ export class Share {
     if (!controls.playing && link.look) said.set('step', String(link.look.step));
     if (!controls.playing || this.branches.isSeveral) said.set('branch', String(this.branches.current));
     if (controls.speed.value !== '1') said.set('speed', controls.speed.value);
-    const at = camera.unit(camera.window[0] / 2, camera.window[1] / 2);
     const isWhole =
       this.matrix.getAttribute('aria-pressed') === 'true' ||
-      (camera.zoom === 1 && !camera.shift[0] && !camera.shift[1]);
-    if (!isWhole) said.set('view', [camera.zoom, ...at].map((one) => one.toPrecision(6)).join(' '));
+      (camera.zoom === 1 && camera.shift.every((one) => Math.abs(one) < HALF));
+    if (!isWhole) said.set('view', this.seen().join(' '));
     if (curves !== this.begun) said.set('curves', curves);
     return said.toString();
+  }
+
+  /** Which part of the picture is seen: how many times as large as the whole, and the units in the middle of the window.
+   * @returns {number[]} */
+  seen() {
+    const { camera } = this,
+      [x, y] = camera.window;
+    return [camera.zoom, ...camera.unit(x / 2, y / 2)].map((one) => Number(one.toPrecision(6)));
+  }
+
+  /** See this part of the picture, once the window has found its shape. @param {number[]} part */
+  see([zoom, ...at]) {
+    const { camera } = this;
+    const see = () => {
+      camera.way = null;
+      camera.zoom = Math.min(64, Math.max(0.25, zoom));
+      camera.shift = at.map((one, axis) => camera.scale * (camera.size[axis] / 2 + camera.corner[axis] - one));
+      this.redraw();
+    };
+    requestAnimationFrame(() => requestAnimationFrame(see));
+  }
+
+  /** Have the run be at a step and go so fast, where this page may ask for that. @param {number | null} step @param {string | null} speed */
+  run(step, speed) {
+    const { controls, link } = this;
+    if (!controls.owner) return;
+    if ([...controls.speed.options].some(({ value }) => value === speed)) link.ask('speed', { value: speed });
+    if (step !== null && Number.isSafeInteger(step) && step >= 0) link.ask('seek', { step });
   }
 
   /** Have the address say where the page is. */
@@ -192,29 +222,16 @@ export class Share {
 
   /** Go to where an address says. @param {URLSearchParams} said */
   restore(said) {
-    const { camera, controls, link } = this,
-      step = number(said.get('step')),
-      speed = said.get('speed'),
-      curves = said.get('curves');
+    const curves = said.get('curves'),
+      branch = number(said.get('branch')),
+      saved = said.get('saved');
     const view = said.get('view')?.split(' ').map(number) ?? [];
-    if (view.length === 3 && !view.includes(null)) {
-      const [zoom, ...at] = /** @type {number[]} */ (view);
-      // once the window has found its shape
-      const see = () => {
-        camera.way = null;
-        camera.zoom = Math.min(64, Math.max(0.25, zoom));
-        camera.shift = at.map((one, axis) => camera.scale * (camera.size[axis] / 2 + camera.corner[axis] - one));
-        this.redraw();
-      };
-      requestAnimationFrame(() => requestAnimationFrame(see));
-    }
+    if (view.length === 3 && !view.includes(null)) this.see(/** @type {number[]} */ (view));
     if (curves !== null) this.pin(curves);
-    if (controls.owner && [...controls.speed.options].some(({ value }) => value === speed))
-      link.ask('speed', { value: speed });
-    const branch = number(said.get('branch')),
-      missing = branch === null ? '' : this.branches.go(branch);
+    const missing = branch === null ? '' : this.branches.go(branch);
     if (missing) this.tell(missing);
-    else if (controls.owner && step !== null && Number.isSafeInteger(step) && step >= 0) link.ask('seek', { step });
+    this.run(missing ? null : number(said.get('step')), said.get('speed'));
+    if (saved) this.opens(saved);
     this.redraw();
   }
 }

@@ -89,6 +89,14 @@ export class Undo {
     this.show();
   }
 
+  /** Do something that is one act, whatever acts it is made of. @param {Act} act */
+  whole(act) {
+    this.now = act;
+    act.redo();
+    this.now = null;
+    this.act(act);
+  }
+
   /** Take back what was done last. */
   back() {
     this.take(this.done, this.undone, 'undone', 'undo');

@@ -1,0 +1,140 @@
+"""Saved views: what is saved is read again, by whoever has edited the file meanwhile, and mistakes have their place."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import neurovis_spec as nv
+from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.diagnostics import Findings, SpecError
+from neurovis_spec.live.clock import SPEEDS
+from neurovis_spec.live.commands import Keep
+from neurovis_spec.live.protocol import ProtocolError, command_of, views_message
+from neurovis_spec.live.saved_views import SavedView, file_beside, keep, views_in
+
+TEXT = """neurovis: 1
+name: x
+neurons: {A: {count: 2}, B: {}}
+connections: {A -> B: 0.5}
+inputs: {push: {expression: 0.1*k}}
+"""
+NETWORK = nv.compile_text(TEXT).network
+CURVES = ("A1", "A1 -> B", "B over A1 with A2", "A1 against B", "rms(A1 - B, last=9)", "push", "A")
+
+texts = st.text(st.characters(exclude_categories=["Cs"]).filter(str.isprintable), min_size=1, max_size=12)
+numbers = st.floats(-1e6, 1e6)
+views = st.builds(
+    SavedView,
+    step=st.integers(0, 1 << 53).map(lambda step: step - 1 if step else step),
+    speed=st.sampled_from([*SPEEDS]),
+    camera=st.none() | st.tuples(st.floats(0.01, 64), numbers, numbers),
+    curves=st.lists(st.sampled_from(CURVES), max_size=4).map(tuple),
+    theme=st.sampled_from(["", "dark", "default", "print"]),
+    closed=st.lists(texts, max_size=3).map(tuple),
+)
+
+
+@given(st.lists(st.tuples(texts, views), min_size=1, max_size=4))
+@settings(max_examples=15, deadline=None)
+def test_what_is_saved_is_read_again_and_comments_stay(
+    tmp_path_factory: pytest.TempPathFactory, saved: list[tuple[str, SavedView]]
+) -> None:
+    path = tmp_path_factory.mktemp("views") / "x.neurovis-view.yaml"
+    own = "neurovis_view: 1 # first\nviews:\n  # of mine\n  mine: {step: 3} # why\n# last\n"
+    path.write_text(own)
+    wanted: dict[str, SavedView] = {"mine": SavedView(3)}
+    for name, view in saved:
+        keep(path, name, view)
+        wanted[name] = view
+    findings = Findings()
+    assert views_in(path, NETWORK, findings) == wanted
+    assert findings.sorted() == ()
+    text = path.read_text(encoding="utf-8")
+    assert all(comment in text for comment in ("# first", "# of mine", "# why", "# last"))
+
+
+WRONG = """\
+neurovis_view: 1
+views:
+  a: {step: -1, camra: [1, 0, 0], curves: [A9, B], speed: fast, theme: drak, closed: 3}
+  b: 7
+more: 1
+"""
+
+
+def test_what_is_wrong_has_its_place_and_the_rest_is_there(tmp_path: Path) -> None:
+    path = tmp_path / "x.neurovis-view.yaml"
+    assert views_in(path, NETWORK, Findings()) == {}, "there is none yet"
+    path.write_text(WRONG)
+    findings = Findings()
+    assert views_in(path, NETWORK, findings) == {"a": SavedView(curves=("B",)), "b": SavedView()}
+    found = [(one.span.line, one.span.column, one.code, one.severity) for one in findings.sorted()]
+    assert found == [
+        (3, 13, "wrong-type", "error"),
+        (3, 17, "unknown-key", "error"),
+        (3, 44, "forgotten-neuron", "warning"),
+        (3, 59, "wrong-type", "error"),
+        (3, 72, "wrong-type", "error"),
+        (3, 86, "wrong-type", "error"),
+        (4, 6, "wrong-type", "error"),
+        (5, 1, "unknown-key", "error"),
+    ]
+    for broken, code in (
+        ("a: [", "yaml-syntax"),
+        ("views: {}", "missing-key"),
+        ("neurovis_view: 2\nviews: 3", "wrong-type"),
+    ):
+        path.write_text(broken + "\n")
+        findings = Findings()
+        assert views_in(path, NETWORK, findings) == {}
+        assert code in {one.code for one in findings.sorted()}
+    before = path.read_bytes()
+    with pytest.raises(SpecError, match="a mapping of names"):
+        keep(path, "a", SavedView(1))
+    with pytest.raises(ValueError, match="cannot be seen"):
+        keep(path, "a\u200b", SavedView(1))
+    assert path.read_bytes() == before
+
+
+def test_a_page_sends_all_of_a_view_and_is_told_all_of_them() -> None:
+    view = {"step": 3, "speed": "max", "camera": [1.5, 0, -2], "curves": ["A1"], "theme": "", "closed": []}
+    wanted = SavedView(3, "max", (1.5, 0.0, -2.0), ("A1",), "", ())
+
+    def message(**more: object) -> str:
+        return json.dumps({"type": "keep", "name": " a  b", "view": {**view, **more}})
+
+    assert command_of(message()) == Keep("a b", wanted)
+    assert json.loads(views_message("x", {"a": wanted}, ""))["views"] == {"a": view}
+    for wrong in (
+        {"step": -1}, {"speed": "3"}, {"camera": [0, 1, 2]}, {"camera": [1, 2]}, {"curves": [3]}, {"theme": "x"},
+        {"closed": "a"}, {"more": 1}, {"camera": [1, 2, 1e301]}, {"curves": ["x"] * 2000},
+    ):  # fmt: skip
+        with pytest.raises(ProtocolError):
+            command_of(message(**wrong))
+    with pytest.raises(ProtocolError):
+        command_of(json.dumps({"type": "keep", "name": " ", "view": view}))
+    assert math.isfinite(wanted.camera[0] if wanted.camera else 0.0)
+
+
+def test_a_view_that_is_not_there_or_a_file_that_is_wrong_is_told_before_anything_is_served(tmp_path: Path) -> None:
+    spec = tmp_path / "x.yaml"
+    spec.write_text(TEXT)
+
+    def told(*arguments: str) -> str:
+        result = CliRunner().invoke(neurovis, ["live", *arguments])
+        assert result.exit_code in (1, 2)
+        return result.stderr
+
+    keep(file_beside(spec), "lesioned", SavedView(1))
+    assert "there is no view 'lesoined' in" in told(str(spec), "--view", "lesoined")
+    assert "did you mean 'lesioned'?" in told(str(spec), "--view", "lesoined")
+    file_beside(spec).write_text(WRONG)
+    assert "x.neurovis-view.yaml:3:13: error[wrong-type]" in told(str(spec), "--view", "a")
+    assert "--view is of a spec" in told("--view", "a")
