@@ -182,5 +182,10 @@ def test_a_view_is_saved_by_name_and_gone_to_in_windows_of_other_sizes(tmp_path:
                     assert await opened.ask(CURVES) == curves, "the file is read when a view is saved"
                 else:
                     await opened.until("document.querySelector('#refusal')?.textContent.includes('no view nothing')")
+            await opened.ask("document.querySelector('#viewname').value = 'now'")
+            await opened.ask("document.querySelector('#keep').requestSubmit()")
+            said = "document.querySelector('#viewsfound:not([hidden])')?.textContent.includes({})"
+            await opened.until(said.format("\"shows 'C99'\""))
+            assert await opened.ask(there) == [NAME, "now"]
 
     asyncio.run(main())
