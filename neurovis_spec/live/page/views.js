@@ -144,7 +144,7 @@ export class Views {
     if (camera && this.asMatrix()) this.share.matrix.click();
     if (camera) share.see(camera);
     share.run(step, speed);
-    if (missing.length) share.tell(`left out, as it is no more: ${missing.join(', ')}`);
+    if (missing.length) share.tell(`left out, as there is none here: ${missing.join(', ')}`);
     this.redraw();
   }
 
