@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from threading import Event
 
 import numpy as np
 import pytest
@@ -14,12 +15,13 @@ import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.live import futures as kept
 from neurovis_spec.live.carry import carried
+from neurovis_spec.live.commands import Compare, Pause, Step
 from neurovis_spec.live.futures import Future
 from neurovis_spec.live.history import Bins, Members, Ring
 from neurovis_spec.live.protocol import ProtocolError, command_of, status_message
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import Reach, SourceError
+from neurovis_spec.live.source import Reach, Seen, SourceError
 from neurovis_spec.live.turns import Hold, Learn, Lesion, Mend, Set, Turn, Weigh
 from neurovis_spec.live.view import view_of
 
@@ -309,6 +311,47 @@ def test_a_name_goes_with_its_branch() -> None:
     source.restart()
     source.switch(source.futures.path(source.futures.all[-1].within[-1].number)[-1].number)
     assert source.name == "first"
+
+    source = at(50)
+    source.go(30)
+    source.turn(Lesion("A1"))
+    source.name = "last"
+    source.advance()
+    source.go(30)
+    source.take_back(0)
+    assert (source.name, [one.name for one in source.futures.all]) == ("", ["last"]), "and is not there twice"
+
+
+def test_what_fails_in_another_branch_is_told_once_and_the_run_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    source, told, shown = at(40), list[str](), list[int | None]()
+    source.go(10)
+    source.turn(Lesion("A1"))
+    run = Run(
+        source,
+        view_of(COMPILED, COMPILED.gains),
+        lambda one: shown.append(one.status.compared),
+        tell=told.append,
+        playing=False,
+    )
+    done = [Event() for _ in range(3)]
+    run.start()
+    run.ask(Compare(0), done=done[0].set)
+    assert done[0].wait(30)
+    assert shown[-1] == 0
+
+    def fails(_: SimulatedSource) -> Seen:
+        raise RuntimeError("a body has failed")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(SimulatedSource, "seen", fails)
+        run.ask(Pause(), done=done[1].set)
+        assert done[1].wait(30)
+    run.ask(Step(1), done=done[2].set)
+    assert done[2].wait(30)
+    run.end()
+    assert source.step == 11
+    assert shown[-1] is None
+    assert "a body has failed" in told[0]
 
 
 def test_any_future_can_be_read_from_where_it_branched_off() -> None:

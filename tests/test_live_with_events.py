@@ -202,6 +202,14 @@ def test_it_is_shown_then_written_and_written_anew(tmp_path: Path) -> None:
         assert told(desk, Save("events"))["written"] is False
         assert told(desk, Write())["written"]
         assert path.read_text() == ODD + "\nevents:\n  - {at: 4, set: {pull: 0.5}}\n"
+        edited = path.read_text().replace("# mine", "# edited")
+        path.write_text(edited)
+        turn(6, Lesion("A3"))
+        assert told(desk, Save("events"))["written"] is False
+        assert told(desk, Write())["written"], "what was saved before is there once, wherever it stands"
+        assert path.read_text() == edited + "  - {at: 7, lesion: A3}\n"
+        path.write_text(path.read_text().replace("lesion: A3", "lesion: [A3]"))
+        assert "have been edited since" in str(told(desk, Save("events"))["reason"])
         path.write_text(ODD.replace("# mine", "# edited"))
         assert "-" not in [line[:1] for line in str(told(desk, Save("events"))["diff"]).splitlines()[2:]]
         path.write_text(ODD.replace("count: 3", "count: 4"))

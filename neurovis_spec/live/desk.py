@@ -178,7 +178,9 @@ class Desk:
                 keep(file_beside(self._written().path), request.name, request.view)
                 self._say_views()
             case Fetch(what="yaml"):
-                file = self._with_events()[1]
+                # what was shown, if anything was
+                shown = None if self._events is None else self._saving
+                file = self._with_events()[1] if shown is None else shown.files[0]
                 answer(file_message(file.path.name, file.after.encode()))
             case Fetch():
                 answer(self._fetch(request, answer))

@@ -99,6 +99,8 @@ class Client:
     #: what it wants the values of, and whether it has just asked
     items: tuple[str, ...] = ()
     asked: bool = False
+    #: whether it is to be sent the branch that is shown beside the run
+    renew: bool = False
     #: the traces that it wants, and those that it is to be sent
     wanted: Trace | None = None
     traces: tuple[bytes, ...] = ()
@@ -271,8 +273,8 @@ class Hub:
             client.tell(joined_message(client.joined.content, self._version))
             for message in self._added(client, client.joined, shown):
                 client.tell(message)
-            for message in self._aside(client, shown):
-                client.tell(message)
+            client.renew = shown.compared is not None
+            client.wake.set()
 
     def _added(self, client: Client, joined: Joined, shown: Shown) -> Iterator[bytes]:
         """What runs from and to the boxes that a client has closed adds up to, where that has changed."""
@@ -346,8 +348,11 @@ class Hub:
             if client.joined is not None:
                 yield from self._added(client, client.joined, shown)
             yield self._frame(since)
-            yield from self._aside(client, shown)
+            client.renew = shown.compared is not None
             client.asked = bool(client.items)
+        if client.renew:
+            client.renew = False
+            yield from self._aside(client, shown)
         if client.asked:
             client.asked = False
             yield values_message(shown.glance.step, _values(shown, client.items))

@@ -533,9 +533,9 @@ class Run:
         """What is seen of the branch that is shown beside the run; where it is no more, or cannot go on, none is."""
         try:
             found = None if self._aside is None else self._aside.compared(self._source, self._view)
-        except SourceError as error:
+        except Exception as error:
             found = None
-            _call(self._tell, str(error))
+            _call(self._tell, self._why(error))
         if found is None:
             self._aside = None
         return found

@@ -28,6 +28,7 @@ from neurovis_spec.likeness import suggest
 from neurovis_spec.live.beside import Beside
 from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.curves import series_of
+from neurovis_spec.live.typed import LONGEST
 from neurovis_spec.live.typed import findings as measured
 from neurovis_spec.runtime.files import replacing
 from neurovis_spec.themes import THEMES
@@ -39,6 +40,8 @@ MOST: Final = 1024
 _NEW: Final = f"neurovis_view: {VERSION}\n"
 _KEYS: Final = ("neurovis_view", "views")
 _OF_VIEW: Final = ("step", "speed", "camera", "curves", "theme", "closed")
+#: A line that is neither blank nor a comment.
+_SAID: Final = re.compile(rb"(?:\xef\xbb\xbf)?\s*[^\s#]")
 #: What joins the signals of one curve: behind the first, in the same axis, in a plane.
 _JOINING: Final = re.compile(r" (?:over|with|against) ")
 
@@ -96,7 +99,9 @@ def keep(path: Path, name: str, view: SavedView) -> None:
     findings = Findings()
     root = _root(path, findings)
     findings.check()
-    text = _NEW if root is None else path.read_bytes().decode("utf-8-sig")
+    text = path.read_bytes().decode("utf-8-sig") if path.exists() else ""
+    if root is None:
+        text += _NEW if not text or text.endswith("\n") else f"\n{_NEW}"
     views = None if root is None else root.get("views")
     if views is not None and not isinstance(views, Entries) and not (isinstance(views, Scalar) and views.value is None):
         findings.error("wrong-type", views.span, f"'views' is a mapping of names, found {describe(views)}")
@@ -136,6 +141,8 @@ def _root(path: Path, findings: Findings) -> Entries | None:
     if isinstance(data, FileFault):
         if data.code != "file-missing":
             findings.error(data.code, Span(path.name, 1, 1, 1, 1), f"the file '{path.name}' {data.reason}")
+        return None
+    if not any(_SAID.match(line) for line in data.splitlines()):
         return None
     document = read_content(data, path.name, findings)
     return None if document is None else document.root
@@ -187,7 +194,7 @@ def _known(network: Network) -> Callable[[str], bool]:
         ends = name.split(" -> ")
         if name in names or (len(ends) == 2 and neurons.issuperset(ends)):
             return True
-        return name.rpartition(".")[0] in names or not measured(name, network)
+        return name.rpartition(".")[0] in names or (len(name) <= LONGEST and not measured(name, network))
 
     return known
 

@@ -327,11 +327,15 @@ class SimulatedSource:
         """Have the run go on differently from here; what came after is another future."""
         self._part(by_turn=False)
 
-    def _part(self, by_turn: bool) -> None:
+    def _leave(self, by_turn: bool) -> None:
+        """What came after the current step is another future, with the name that the run had."""
         before = self.futures.made
         self.futures = self._left(self.step, by_turn).bounded()
         if self.futures.made > before:
             self.name = ""
+
+    def _part(self, by_turn: bool) -> None:
+        self._leave(by_turn)
         self._past.cut(self._simulation.k)
         self.history.cut(self.step)
         self._last = self.step
@@ -381,7 +385,7 @@ class SimulatedSource:
         """Be at the current step as though a turn had not been taken here."""
         step, before = self.step, self.futures
         rest = [entry for entry in self._turned if entry.step <= step and entry.number != one.number]
-        self.futures = self._left(step).bounded()
+        self._leave(by_turn=False)
         self._past.cut(step)
         self.history.cut(step)
         self._turned, self._last, self._listed = rest, step, ([], ())

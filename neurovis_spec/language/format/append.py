@@ -61,9 +61,13 @@ def _insertions(
             last = source.end(root.entries[-1].value)
             more = [_Insertion(last, f", {key}: [{', '.join(items)}]")] if items else []
             return [*more, _below(source, source.end(root), 0, comments)]
-        begin = f"\n{' ' * column}{key}:\n" if items else ""
-        lines = _lines(column + _STEP, [f"- {item}" for item in items]) + _lines(column, comments)
-        return [_Insertion(_next_line(source, source.end(root)), begin + lines)]
+        begin = f"{' ' * column}{key}:\n" if items else ""
+        lines = begin + _lines(column + _STEP, [f"- {item}" for item in items]) + _lines(column, comments)
+        at = _next_line(source, source.end(root))
+        rest = source.text[at:]
+        if rest and not rest.strip():  # these blank lines may belong to the last text
+            return [_Insertion(len(source.text), lines)]
+        return [_Insertion(at, "\n" + lines if items else lines)]
     return _into(source, entry, column, items, comments)
 
 

@@ -230,6 +230,7 @@ const link = new Link({
       range.status(message);
       strips.owner = message.owner;
       strips.measures(message.measures);
+      views.measures(message.measures);
       share.status();
       views.status();
     } else if (message.type === 'values') attention.take(message);
@@ -243,8 +244,10 @@ const link = new Link({
     } else if (message.type === 'saving') {
       placing.saving(message);
       if (message.written) controls.tell(`saved ${message.files.join(', ')}`);
-    } else if (message.type === 'measured') measuring.take(message);
-    else if (message.type === 'views') views.take(message);
+    } else if (message.type === 'measured') {
+      measuring.take(message);
+      views.measured(message);
+    } else if (message.type === 'views') views.take(message);
     else if (message.type === 'making') share.making(message.done, message.total);
     else if (message.type === 'refused') {
       share.made();

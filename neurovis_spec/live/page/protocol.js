@@ -163,6 +163,10 @@ function takeSums(buffer, sums) {
   });
 }
 
+/** How a spec refers to a neuron or a connection. @param {Group['data']} data @returns {string} */
+export const refOf = ({ neuron, connection, index }) =>
+  neuron ?? (connection && Number(index) > 1 ? `${connection} (${index})` : connection);
+
 /** The names of what a neuron or a connection has beside its activity or weight. @param {Scene | null} scene @param {string} id
  * @returns {string[]} */
 export function namesOf(scene, id) {
@@ -273,7 +277,8 @@ export class Link {
     };
     // one message after the other: a scene takes a while to unpack
     socket.onmessage = (event) => {
-      this.work = this.work.then(() => this.receive(event.data));
+      const receive = () => this.receive(event.data);
+      this.work = this.work.then(receive).catch((error) => console.error(error)); // the next may be well
     };
     socket.onclose = () => {
       this.listener.link(false);

@@ -2,6 +2,7 @@
  * Sharing: where the page is, in its address, so that a link shows the same; and the picture alone, for a talk.
  */
 
+import { refOf } from './protocol.js';
 import { pixelsOf } from './save.js';
 import { PINS } from './strips.js';
 
@@ -124,7 +125,7 @@ export class Share {
   named(key) {
     const [id, what] = key.split('.'),
       data = this.attention.groups.get(id)?.data;
-    const name = data?.neuron ?? data?.connection ?? id;
+    const name = (data && refOf(data)) ?? id;
     return what ? name + OF + what : name;
   }
 
@@ -132,7 +133,7 @@ export class Share {
   item(named) {
     const [name, what] = named.split(OF);
     for (const { id, data } of this.attention.groups.values()) {
-      if ((data.neuron ?? data.connection) === name) return what ? `${id}.${what}` : id;
+      if (refOf(data) === name) return what ? `${id}.${what}` : id;
     }
     return /^[eims]\d+$/.test(name) && this.strips.group(name) ? name : '';
   }

@@ -167,6 +167,26 @@ export class Strips {
     return all.find(({ data, title }) => data.neuron === name || title.split('\n')[0] === shown)?.id ?? '';
   }
 
+  /** What is behind the first signal of a strip, as far as it is there by now. @param {Strip} strip @returns {Curve} */
+  behind({ behind, names }) {
+    const found = behind.flatMap((key, at) => {
+      const what = key.split('.')[1],
+        name = names[1 + at],
+        id = this.named(what ? name.slice(0, -what.length - 1) : name);
+      return id ? [{ item: what ? `${id}.${what}` : id, name }] : [];
+    });
+    return { items: ['', ...found.map(({ item }) => item)], names: [names[0], ...found.map(({ name }) => name)] };
+  }
+
+  /** Show of what a strip shows besides only what there is by now. @param {Strip} strip @param {Group[]} groups */
+  lose(strip, groups) {
+    const before = strip.joined.length + Number(strip.against !== null);
+    strip.joined = again(strip.joined, groups);
+    [strip.against = null] = again(strip.against ? [strip.against] : [], groups);
+    if (strip.joined.length + Number(strip.against !== null) < before)
+      this.of(strip, this.group(strip.id), strip.what, { items: ['', ...strip.behind], names: strip.names });
+  }
+
   /** Pin the strip of an id, where it is not yet. @param {string} id */
   pin(id) {
     if (!this.pinned.some(({ key }) => key === id)) this.toggle({ id, what: '', key: id });
@@ -177,7 +197,9 @@ export class Strips {
     if (JSON.stringify(measures) === this.typed) return;
     this.typed = JSON.stringify(measures);
     this.beside.measure(measures);
+    const all = [...this.attention.groups.values(), ...this.beside.groups.values()];
     this.pinned = this.pinned.filter(({ id }) => id[0] !== 'm' || this.group(id));
+    for (const strip of this.pinned) this.lose(strip, all);
     const ids = measures.map(({ number }) => `m${number}`),
       fresh = ids.filter((id) => !this.met.has(id));
     this.met = new Set(ids);
@@ -321,19 +343,11 @@ export class Strips {
 
   /** Another network; what has the same name in it stays pinned. */
   use() {
-    const groups = [...this.attention.groups.values(), ...this.beside.groups.values()],
-      curves = this.link.scene?.curves ?? [];
+    const groups = [...this.attention.groups.values(), ...this.beside.groups.values()];
     this.pinned = this.pinned.filter((strip) => {
       const same = groups.find(({ data }) => JSON.stringify(data) === strip.data);
-      strip.joined = again(strip.joined, groups);
-      [strip.against = null] = again(strip.against ? [strip.against] : [], groups);
-      if (same)
-        this.of(
-          strip,
-          same,
-          strip.what,
-          strip.behind.length ? curves.find(({ items }) => items[0] === same.id) : undefined,
-        );
+      this.lose(strip, groups);
+      if (same) this.of(strip, same, strip.what, this.behind(strip));
       return same;
     });
     this.of(this.held, this.attention.groups.get(this.held.id), this.held.what);

@@ -4,6 +4,7 @@
 
 import { Appearance, drawnOtherwise } from './appearance.js';
 import { Feeds } from './feeds.js';
+import { refOf } from './protocol.js';
 import { Rules } from './rules.js';
 import { Sliders, withNumber } from './sliders.js';
 import { told } from './told.js';
@@ -73,8 +74,8 @@ export class Turning {
   hold(group) {
     this.find('part').hidden = !group || !['hold', 'lesion', 'weigh'].some((type) => this.link.takes.has(type));
     if (!group) return;
-    const { neuron, connection, index } = group.data;
-    this.ref = neuron ?? (Number(index) > 1 ? `${connection} (${index})` : connection);
+    const { neuron } = group.data;
+    this.ref = refOf(group.data);
     this.find('parted').textContent = this.ref;
     this.find('clamps').hidden = neuron === undefined;
     this.weight.hold(group, this.ref);

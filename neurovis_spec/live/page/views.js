@@ -2,6 +2,8 @@
  * Saved views: where the page stood, by names, in a file beside the spec; gone to with a click.
  */
 
+import { refOf } from './protocol.js';
+
 /** @typedef {import('./appearance.js').Appearance} Appearance */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Joined} Joined */
@@ -12,6 +14,9 @@
 
 /** What joins the signals of a curve: behind the first, in the same axis, in a plane. */
 const JOINING = / (over|with|against) /;
+/** The most characters of a measure, and of what is saved. */
+const LONGEST = 500,
+  LARGEST = 12000;
 
 /** The views that are saved. */
 export class Views {
@@ -31,12 +36,22 @@ export class Views {
     this.file = '';
     /** the one that is to be gone to as soon as they are told */
     this.wanted = '';
+    /** the one that is being saved */
+    this.saving = '';
+    /** curves that wait for measures, and for which, by their texts @type {{curves: string[], texts: Set<string>} | null} */
+    this.waiting = null;
     const field = /** @type {HTMLInputElement} */ (part('viewname'));
     this.form.onsubmit = (event) => {
       event.preventDefault();
       const name = field.value.trim();
       if (!name) return;
-      share.link.ask('keep', { name, view: this.state() });
+      const view = this.state();
+      if (JSON.stringify(view).length > LARGEST) {
+        share.tell('too many curves and closed boxes for a view');
+        return;
+      }
+      this.saving = name;
+      share.link.ask('keep', { name, view });
       field.value = '';
     };
     share.opens = (name) => this.open(name);
@@ -49,7 +64,6 @@ export class Views {
 
   /** They are told. @param {{file: string, views: Object<string, SavedView>, findings: string}} message */
   take({ file, views, findings }) {
-    const before = this.all;
     [this.all, this.file] = [views, file];
     this.status();
     this.found.textContent = findings;
@@ -66,8 +80,10 @@ export class Views {
         return row;
       }),
     );
-    const fresh = before && Object.keys(views).find((name) => !(name in before));
-    if (fresh) this.undo.tell(`saved ${fresh} in ${file}`);
+    if (this.saving && Object.hasOwn(views, this.saving)) {
+      this.undo.tell(`saved ${this.saving} in ${file}`);
+      this.saving = '';
+    }
     if (this.wanted) this.open(this.wanted);
   }
 
@@ -98,7 +114,7 @@ export class Views {
     return {
       step: share.link.look?.step ?? 0,
       speed: share.controls.speed.value,
-      camera: this.asMatrix() ? null : share.seen(),
+      camera: this.asMatrix() ? null : this.units(share.seen(), false),
       curves: share.strips.pinned.map((strip) => {
         const [first, ...behind] = [strip.key, ...strip.behind].map((key) => this.named(key));
         const more = strip.joined.map(({ key }) => ` with ${this.named(key)}`);
@@ -110,11 +126,21 @@ export class Views {
     };
   }
 
+  /** A part of the picture in units of the layout, as the file has it, or of one there in those of the picture.
+   * @param {number[]} part @param {boolean} back @returns {number[]} */
+  units([zoom, ...at], back) {
+    const { scale = 0, left = 0, top = 0 } = this.share.link.scene?.constants ?? {};
+    if (!scale) return [zoom, ...at];
+    const from = [left, top];
+    const there = at.map((one, axis) => (back ? from[axis] + scale * one : (one - from[axis]) / scale));
+    return [zoom, ...there.map((one) => Number(one.toPrecision(6)))];
+  }
+
   /** How the file calls what is asked for by a key. @param {string} key @returns {string} */
   named(key) {
     const [id, what] = key.split('.'),
       group = this.share.strips.group(id),
-      called = group?.data.neuron ?? group?.data.connection ?? group?.title ?? '';
+      called = (group && refOf(group.data)) ?? group?.title ?? '';
     return what ? `${called}.${what}` : called;
   }
 
@@ -123,8 +149,7 @@ export class Views {
     const { attention, strips } = this.share,
       all = [...attention.groups.values(), ...strips.beside.groups.values()];
     /** @param {string} called */
-    const id = (called) =>
-      all.find(({ data, title }) => (data.neuron ?? data.connection ?? title) === called)?.id ?? '';
+    const id = (called) => all.find(({ data, title }) => (refOf(data) ?? title) === called)?.id ?? '';
     const own = id(name),
       dot = name.lastIndexOf('.'),
       other = own || dot < 0 ? '' : id(name.slice(0, dot));
@@ -142,25 +167,27 @@ export class Views {
     }
     if (theme !== null && theme !== this.appearance.chosen) this.appearance.choose(theme);
     if (camera && this.asMatrix()) this.share.matrix.click();
-    if (camera) share.see(camera);
+    if (camera) share.see(this.units(camera, true));
     share.run(step, speed);
     if (missing.length) share.tell(`left out, as there is none here: ${missing.join(', ')}`);
     this.redraw();
   }
 
-  /** Pin curves and nothing else; what is none any more. @param {string[]} curves @returns {string[]} */
-  pin(curves) {
+  /** Pin curves and nothing else; what is none any more. What nothing is called may be a measure: the owner's run is asked
+   * for it, and they are pinned again when it is one. @param {string[]} curves @param {boolean} [asks] @returns {string[]} */
+  pin(curves, asks = true) {
     const { controls, link, strips } = this.share,
-      /** @type {string[]} */ missing = [],
-      keys = new Map();
-    for (const name of curves.flatMap((curve) => curve.split(JOINING).filter((_, at) => at % 2 === 0))) {
-      const key = this.key(name);
-      keys.set(name, key);
-      if (key) continue;
-      // what nothing is called is a measure, which is a curve of its own when the run has it
-      if (controls.owner) link.ask('measure', { text: name });
-      else missing.push(name);
+      all = new Set(curves.flatMap((curve) => curve.split(JOINING).filter((_, at) => at % 2 === 0)));
+    const keys = new Map([...all].map((name) => [name, this.key(name)])),
+      unknown = [...all].filter((name) => !keys.get(name)),
+      asked = asks && controls.owner ? unknown.filter((text) => text.length <= LONGEST) : [];
+    this.waiting = asked.length ? { curves, texts: new Set(asked) } : null;
+    if (controls.owner) {
+      // a measure without a strip could not be taken away
+      for (const { id } of strips.pinned)
+        if (id[0] === 'm' && ![...keys.values()].includes(id)) link.ask('unmeasure', { number: Number(id.slice(1)) });
     }
+    for (const text of asked) link.ask('measure', { text });
     strips.pinned = [];
     for (const curve of curves) {
       const [first, ...more] = curve.split(JOINING),
@@ -168,11 +195,31 @@ export class Views {
       for (let at = 0; at < more.length; at += 2) if (keys.get(more[at + 1])) beside[more[at]].push(more[at + 1]);
       if (!keys.get(first) || strips.full) continue;
       const names = [first, ...beside.over],
-        joined = beside.with.map((name) => keys.get(name)),
-        [against] = beside.against.map((name) => keys.get(name));
-      strips.put({ items: names.map((name) => keys.get(name)), names }, joined, against);
+        joined = beside.with.map((name) => keys.get(name) ?? ''),
+        [against] = beside.against.map((name) => keys.get(name) ?? '');
+      strips.put({ items: names.map((name) => keys.get(name) ?? ''), names }, joined, against);
     }
     strips.list();
-    return missing;
+    return unknown.filter((name) => !asked.includes(name));
+  }
+
+  /** Whether a text is a measure has been told. @param {{text: string, findings: object[]}} message */
+  measured({ text, findings }) {
+    if (!this.waiting?.texts.has(text) || !findings.length) return;
+    this.share.tell(`left out, as there is none: ${text}`);
+    this.met([text]);
+  }
+
+  /** There are these measures. @param {{text: string}[]} measures */
+  measures(measures) {
+    this.met(measures.map(({ text }) => text));
+  }
+
+  /** It is known what these are: where nothing is waited for any more, all that there is is pinned. @param {string[]} texts */
+  met(texts) {
+    const { waiting } = this;
+    if (!waiting || !texts.some((text) => waiting.texts.delete(text)) || waiting.texts.size) return;
+    this.pin(waiting.curves, false);
+    this.redraw();
   }
 }
