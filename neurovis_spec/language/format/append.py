@@ -13,7 +13,7 @@ from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.format.canonical import FormattingError, with_line_feeds
 from neurovis_spec.language.format.printer import Source
 from neurovis_spec.language.yaml.reader import read_text
-from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping
+from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Scalar
 
 _STEP = 2
 
@@ -76,6 +76,8 @@ def _into(source: Source, entry: Entry, column: int, items: Sequence[str], comme
     value = entry.value
     begin, end = source.begin(value), source.end(value)
     dashed = [f"- {item}" for item in items]
+    if isinstance(value, Scalar) and value.value is None and begin == end:  # a key alone
+        return [_below(source, source.end(entry.key), column + _STEP, [*dashed, *comments])]
     if not isinstance(value, AnyList):
         raise FormattingError(f"{entry.name} is no list")
     if source.is_block(value):
