@@ -235,7 +235,8 @@ def test_what_is_held_is_drawn_listed_and_counted_with_the_weights_of_now(tmp_pa
             for group in groups:
                 a, b, c, d = np.reshape(group["shapes"][0]["points"][:8], (4, 2))
                 x, y = np.rint(within(*(a + 3 * b + 3 * c + d) / 8)).astype(int)
-                assert pixels[y - 2 : y + 3, x - 2 : x + 3].min() < 180, "the line is there, and all else recedes"
+                # a thin line between two pixels is as pale as 182, one that recedes as 242
+                assert pixels[y - 2 : y + 3, x - 2 : x + 3].min() < 200, "the line is there, and all else recedes"
             # the outline has the same, each with its weight of this step
             await opened.key("o")
             await opened.until(
