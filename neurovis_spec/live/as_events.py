@@ -40,7 +40,7 @@ def as_events(turned: Sequence[Turned]) -> AsEvents:
     last = _last_of(turned)
     entries, left, drags = list[str](), list[str](), list[str]()
     for place, one in enumerate(last):
-        entry, why = _event(one, last[:place], last[place + 1 :])
+        entry, why = _event(last, place)
         if entry:
             entries.append(entry)
         if why:
@@ -59,7 +59,8 @@ def _comment(words: str) -> str:
 
 
 def _last_of(turned: Sequence[Turned]) -> list[Turned]:
-    """What is turned at each step in the end, in the order in which it was done last; of parameters each by itself."""
+    """Turns that count at each step in the end, in the order in which they were taken last; of parameters each by
+    itself."""
     last: dict[tuple[int, str, str], Turned] = {}
     for entry in turned:
         what = entry.turn
@@ -88,8 +89,9 @@ def _known_by(what: Turn) -> tuple[str, str]:
             return "weigh", what.connections
 
 
-def _event(one: Turned, before: Sequence[Turned], later: Sequence[Turned]) -> tuple[str, str]:
-    """A turn as an event, or why there is none."""
+def _event(turned: Sequence[Turned], place: int) -> tuple[str, str]:
+    """A turn, by its place among all, as an event, or why there is none."""
+    one = turned[place]
     at, what, (_, name) = one.step + 1, one.turn, _known_by(one.turn)
     named = _text(name)
     if isinstance(what, Lesion | Mend | Learn | Weigh) and _SEVERAL.search(name):
@@ -105,11 +107,13 @@ def _event(one: Turned, before: Sequence[Turned], later: Sequence[Turned]) -> tu
         case Learn():
             return f"{{at: {at}, learning: {{{named}: {str(what.on).lower()}}}}}", ""
         case Hold():
-            end = next((other.step + 1 for other in later if _known_by(other.turn) == ("clamp", name)), None)
+            end = next(
+                (other.step + 1 for other in turned[place + 1 :] if _known_by(other.turn) == ("clamp", name)), None
+            )
             to = "" if end is None else f"to: {end}, "
             return f"{{from: {at}, {to}clamp: {{{named}: {number_text(what.value)}}}}}", ""
         case Release():
-            clamps = [other.turn for other in before if _known_by(other.turn) == ("clamp", name)]
+            clamps = [other.turn for other in turned[:place] if _known_by(other.turn) == ("clamp", name)]
             ended = clamps and isinstance(clamps[-1], Hold)
             return "", "" if ended else f"release {name}: the clamp that ends says so itself (to: {at})"
         case Lesion():

@@ -221,7 +221,8 @@ class Desk:
 
     def _with_events(self) -> tuple[WithEvents, File]:
         """The spec with what was turned as its events. Raises SavingError, SpecError, OSError."""
-        spec, data = self._written(), self._written().path.read_bytes()
+        spec = self._written()
+        data = spec.path.read_bytes()
         made = with_events(data.decode(), self._placed.compiled.hash, self._inquire(_turned), spec.compile, self._noted)
         return made, File(spec.path, data, made.after)
 

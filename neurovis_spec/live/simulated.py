@@ -335,6 +335,7 @@ class SimulatedSource:
             self.name = ""
 
     def _part(self, by_turn: bool) -> None:
+        """``branch``, or, ``by_turn``, what a turn does before it has its effect."""
         self._leave(by_turn)
         self._past.cut(self._simulation.k)
         self.history.cut(self.step)

@@ -53,7 +53,7 @@ def _count(root: Mapping, key: str) -> int:
 def _insertions(
     source: Source, root: Mapping, key: str, items: Sequence[str], comments: Sequence[str]
 ) -> list[_Insertion]:
-    """What is to be added, in order."""
+    """Insertions that add the items, in order."""
     entry, is_block = root.entry(key), source.is_block(root)
     column = root.span.column - 1 if is_block else 0
     if entry is None:

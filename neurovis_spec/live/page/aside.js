@@ -3,23 +3,18 @@
  * camera.
  */
 
-import { Drawing } from './draw.js';
-import { Marks } from './marks.js';
+import { called, every } from './branches.js';
 import { Matrix } from './matrix.js';
-import { Zoom } from './zoom.js';
+import { Picture } from './picture.js';
 
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {import('./draw.js').Context} Context */
 /** @typedef {import('./protocol.js').Future} Future */
+/** @typedef {import('./picture.js').Held} Held */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./protocol.js').Status} Status */
-
-/** All of a tree. @param {Future[]} futures @returns {Future[]} */
-const every = (futures) => futures.flatMap((one) => [one, ...every(one.within)]);
-
-/** How a branch is called. @param {Future} branch @returns {string} */
-export const called = ({ name, at, last }) => name || `the branch from step ${at + 1} to ${last}`;
+/** @typedef {import('./zoom.js').Zoom} Zoom */
 
 /** The picture of another branch. */
 export class Aside {
@@ -30,11 +25,7 @@ export class Aside {
     this.arrange = arrange;
     this.canvas = /** @type {HTMLCanvasElement} */ (find('other'));
     this.context = /** @type {Context} */ (this.canvas.getContext('2d', { alpha: false }));
-    this.zoom = new Zoom();
-    /** @type {Drawing | null} */
-    this.drawing = null;
-    /** @type {Marks | null} */
-    this.marks = null;
+    this.picture = new Picture();
     /** @type {Matrix | null} */
     this.matrix = null;
     /** the branch that is shown @type {Future | null} */
@@ -62,14 +53,14 @@ export class Aside {
 
   /** Another picture of the network, or another network. @param {Scene} scene */
   use(scene) {
-    this.zoom.use(scene);
-    this.drawing = this.matrix = null;
+    this.picture.zoom.use(scene);
+    this.picture.drawing = this.matrix = null;
   }
 
   /** Draw it as the run is drawn; true where there is more to be drawn.
-   * @param {Camera} camera @param {Zoom} zoom of the run @param {{near: Set<string>, held: string}} attention @param {boolean} asMatrix
+   * @param {Camera} camera @param {Zoom} zoom of the run @param {Held} held @param {boolean} asMatrix
    * @returns {boolean} */
-  draw(camera, zoom, attention, asMatrix) {
+  draw(camera, zoom, held, asMatrix) {
     const { canvas, context, link, branch } = this,
       look = link.other;
     if (!branch || !look?.serial || !link.scene) return false;
@@ -80,27 +71,16 @@ export class Aside {
     canvas.setAttribute('aria-label', `B, ${called(branch)}, ${look.caption || `step ${look.step}`}`);
     if (asMatrix) {
       this.matrix ??= new Matrix(link.scene);
-      [this.matrix.near, this.matrix.held] = [attention.near, attention.held];
-      return this.matrix.draw(context, camera, look);
+      return this.matrix.draw(context, camera, look, held);
     }
-    const scene = this.seen(camera, zoom);
-    if (!scene) return false;
-    if (!this.drawing || (this.drawing.scene !== scene && !this.drawing.isPassing(camera))) {
-      this.drawing = new Drawing(scene);
-      this.marks = new Marks(scene);
-    }
-    [this.drawing.near, this.drawing.held] = [attention.near, attention.held];
-    const more = this.drawing.draw(context, camera, look);
-    this.marks?.draw(context, camera, look, attention.near);
-    this.zoom.draw(context, camera, look, this.drawing);
-    return more;
+    this.follow(zoom);
+    return this.picture.draw(context, camera, look, held);
   }
 
-  /** The scene as the run's is seen, with the same boxes closed. @param {Camera} camera @param {Zoom} zoom */
-  seen(camera, { scene, hand, joined, ids }) {
-    const own = this.zoom,
-      isSame = own.scene === scene && own.joined === joined && own.ids.join() === ids.join();
-    if (!isSame) Object.assign(own, { scene, hand, joined, made: null });
-    return own.seen(camera);
+  /** See the scene as the run's is seen, with the same boxes closed. @param {Zoom} zoom */
+  follow({ scene, hand, joined, ids }) {
+    const { zoom } = this.picture,
+      isSame = zoom.scene === scene && zoom.joined === joined && zoom.ids.join() === ids.join();
+    if (!isSame) Object.assign(zoom, { scene, hand, joined, made: null });
   }
 }

@@ -9,6 +9,12 @@ import { told } from './told.js';
 /** @typedef {import('./protocol.js').Status} Status */
 /** @typedef {import('./undo.js').Undo} Undo */
 
+/** All of a tree. @param {Future[]} futures @returns {Future[]} */
+export const every = (futures) => futures.flatMap((one) => [one, ...every(one.within)]);
+
+/** How a branch is called. @param {Future} branch @returns {string} */
+export const called = ({ name, at, last }) => name || `the branch from step ${at + 1} to ${last}`;
+
 /** The list of branches. */
 export class Branches {
   /** @param {Link} link @param {(id: string) => HTMLElement} find @param {Undo} undo
@@ -48,10 +54,10 @@ export class Branches {
     this.compared = compared;
     const key = JSON.stringify([futures, owner, compared, branch, current]);
     const isThere = (/** @type {number} */ one) =>
-      one === current || this.all(futures).some(({ number }) => number === one);
+      one === current || every(futures).some(({ number }) => number === one);
     if (key === this.shown || (this.naming >= 0 && isThere(this.naming))) return;
     this.shown = key;
-    if (this.chosen !== null && !this.all(futures).some(({ number }) => number === this.chosen)) this.choose(null, '');
+    if (this.chosen !== null && !every(futures).some(({ number }) => number === this.chosen)) this.choose(null, '');
     this.list(futures);
   }
 
@@ -63,7 +69,7 @@ export class Branches {
   /** Go to the branch of a link; '' where the run is there then, else why it is not. @param {number} wanted @returns {string} */
   go(wanted) {
     if (wanted === this.current) return '';
-    const known = this.all(this.futures).find(({ number }) => number === wanted);
+    const known = every(this.futures).find(({ number }) => number === wanted);
     if (!known) return 'the branch of this link is no more: what the run does now is shown instead';
     if (known.older)
       return 'the branch of this link is of an older spec: its curves can be compared, but it cannot go on';
@@ -71,11 +77,6 @@ export class Branches {
       return 'this link is of another branch: only the owner can go there, and this page shows where the run is';
     this.link.ask('switch', { number: wanted });
     return '';
-  }
-
-  /** All of a tree. @param {Future[]} futures @returns {Future[]} */
-  all(futures) {
-    return futures.flatMap((one) => [one, ...this.all(one.within)]);
   }
 
   /** @param {Future[]} futures */
@@ -117,30 +118,30 @@ export class Branches {
     const { number, name, at, last, turned, within, older } = future;
     const words = turned.map((entry) => `step ${entry.step + 1}: ${told(entry)}`).join('; ') || 'as it went',
       span = `from step ${at + 1} to ${last}`,
-      called = name || `the branch ${span}`;
+      own = called(future);
     const go = this.button(
       `${name ? `${name}, ` : ''}${span}: ${words}${older ? ' (of an older spec)' : ''}`,
       '',
-      () => (older ? this.choose(number, called) : this.link.ask('switch', { number })),
+      () => (older ? this.choose(number, own) : this.link.ask('switch', { number })),
     );
     go.className = 'go';
     go.title = older
       ? 'its curves can be shown beside; it cannot go on, as the spec is another one'
       : 'go there, to the same step';
     go.disabled = !this.owner && !older;
-    const beside = this.button('A | B', `A | B with ${called}`, () => {
+    const beside = this.button('A | B', `A | B with ${own}`, () => {
       const isShown = this.compared === number,
         show = (/** @type {number} */ which) => () => this.link.ask('compare', { number: which });
       const [now, back] = isShown ? [-1, number] : [number, this.compared ?? -1];
       show(now)();
-      if (!isShown && this.chosen !== number) this.choose(number, called);
-      this.undo.act({ words: isShown ? 'A alone' : `A | B, ${called}`, undo: show(back), redo: show(now) });
+      if (!isShown && this.chosen !== number) this.choose(number, own);
+      this.undo.act({ words: isShown ? 'A alone' : `A | B, ${own}`, undo: show(back), redo: show(now) });
     });
     beside.setAttribute('aria-pressed', String(this.compared === number));
     beside.className = 'small';
     beside.title = 'its picture beside this one, at the same step';
-    const compare = this.button('compare', `compare with ${called}`, () =>
-      this.choose(this.chosen === number ? null : number, called),
+    const compare = this.button('compare', `compare with ${own}`, () =>
+      this.choose(this.chosen === number ? null : number, own),
     );
     compare.setAttribute('aria-pressed', String(this.chosen === number));
     compare.dataset.branch = String(number);
@@ -149,14 +150,14 @@ export class Branches {
     place.append(compare);
     if (this.owner && !older) place.append(beside);
     if (this.owner) {
-      const forget = this.button('delete', `delete ${called}`, () => {
+      const forget = this.button('delete', `delete ${own}`, () => {
         this.link.ask('forget', { number });
-        const more = within.length ? `, and ${this.all(within).length} within it` : '';
+        const more = within.length ? `, and ${every(within).length} within it` : '';
         const again = { undo: () => this.link.ask('restore'), redo: () => this.link.ask('forget', { number }) };
-        this.undo.act({ words: `deleted ${called}${more}`, ...again });
-        this.undo.tell(`deleted ${called}${more}`);
+        this.undo.act({ words: `deleted ${own}${more}`, ...again });
+        this.undo.tell(`deleted ${own}${more}`);
       });
-      const rename = this.button('rename', `rename ${called}`, () => this.rename(future, go));
+      const rename = this.button('rename', `rename ${own}`, () => this.rename(future, go));
       forget.className = rename.className = 'small';
       place.append(rename, forget);
     }

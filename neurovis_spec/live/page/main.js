@@ -11,16 +11,15 @@ import { Branches } from './branches.js';
 import { Camera } from './camera.js';
 import { channels, luminance } from './colours.js';
 import { Controls, part } from './controls.js';
-import { Drawing } from './draw.js';
 import { listKeys } from './keys.js';
 import { Legend } from './legend.js';
-import { Marks } from './marks.js';
 import { Matrix } from './matrix.js';
 import { Measuring } from './measuring.js';
 import { NotFinite } from './notfinite.js';
 import { Outline } from './outline.js';
 import { arrangePanels, greet } from './panels.js';
 import { under } from './pick.js';
+import { Picture } from './picture.js';
 import { followFingers } from './pinch.js';
 import { Placing } from './place.js';
 import { Pointer } from './pointer.js';
@@ -38,21 +37,17 @@ import { told } from './told.js';
 import { Turning } from './turning.js';
 import { Undo } from './undo.js';
 import { Views } from './views.js';
-import { Zoom } from './zoom.js';
 
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('picture'));
 const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', { alpha: false }));
 const camera = new Camera(),
-  zoom = new Zoom();
+  picture = new Picture(),
+  { zoom } = picture;
 /** What is gone to is seen with so many radii of a neuron around it. */
 const ROOM = 12;
 /** The id of a neuron or a connection. */
 const ITEM = /^[nc]\d+$/;
-/** @type {Drawing | null} */
-let drawing = null;
-/** what is lesioned in it @type {Marks | null} */
-let marks = null;
-/** what is shown in place of the drawing, where it is @type {Matrix | null} */
+/** what is shown in place of the picture, where it is @type {Matrix | null} */
 let matrix = null;
 /** of which closed boxes it was asked what runs from and to them */
 let joining = '';
@@ -86,22 +81,10 @@ function show() {
   if (density !== devicePixelRatio) resize();
   if (camera.glide()) redraw();
   if (!matrix) {
-    const scene = zoom.seen(camera);
-    if (!scene) return;
+    if (!zoom.seen(camera)) return;
     if (!camera.way) asks();
-    if (!drawing || (drawing.scene !== scene && !drawing.isPassing(camera))) {
-      drawing = new Drawing(scene);
-      marks = new Marks(scene);
-    }
   }
-  const picture = matrix || drawing;
-  if (!picture) return;
-  [picture.near, picture.held] = [attention.near, attention.held];
-  const more = picture.draw(context, camera, look);
-  if (!matrix && drawing) {
-    marks?.draw(context, camera, look, attention.near);
-    zoom.draw(context, camera, look, drawing);
-  }
+  const more = (matrix || picture).draw(context, camera, look, attention);
   const unfinished = aside.draw(camera, zoom, attention, matrix !== null);
   attention.show(camera, look);
   outline.show(look);
@@ -158,7 +141,7 @@ const link = new Link({
     legend.use(scene);
     room.use(network, stays !== undefined);
     joining = '';
-    drawing = null;
+    picture.drawing = null;
     document.title = `${scene.title} – NeuroVis`;
     const names = { back: 'background', ink: 'ink', muted: 'muted', line: 'box_line', fill: 'box_fill' };
     const { style } = document.documentElement;
@@ -348,7 +331,7 @@ function enter(id) {
 /** Have a neuron or a connection be seen. @param {string} id */
 function see(id) {
   const [x, y] = attention.middle(id),
-    room = ROOM * (drawing?.discs[0]?.shape.radius ?? 20);
+    room = ROOM * (picture.drawing?.discs[0]?.shape.radius ?? 20);
   const outside = camera.pixel(x, y).some((pixel, axis) => pixel < 0 || pixel > camera.window[axis]);
   if (outside || (!matrix && zoom.under([x, y]))) camera.see([x - room, y - room, x + room, y + room]);
 }
@@ -356,10 +339,10 @@ function see(id) {
 new ResizeObserver(resize).observe(canvas);
 const placing = new Placing(
   link,
-  () => !matrix && drawing !== null,
+  () => !matrix && picture.drawing !== null,
   (group) => {
-    if (group) drawing?.reshape(zoom.inked(group));
-    aside.drawing = null;
+    if (group) picture.drawing?.reshape(zoom.inked(group));
+    aside.picture.drawing = null;
     redraw();
   },
   part,
@@ -367,7 +350,8 @@ const placing = new Placing(
 const pointer = new Pointer(canvas, camera, attention, placing, {
   pointed(x, y) {
     if (matrix) return matrix.under(camera, x, y);
-    const at = camera.unit(x, y);
+    const at = camera.unit(x, y),
+      { drawing } = picture;
     return (
       zoom.under(at) || (drawing ? under(drawing, camera, x, y) || zoom.titled(at, context, drawing.family.join()) : '')
     );

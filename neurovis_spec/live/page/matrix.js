@@ -60,8 +60,9 @@ export class Matrix {
   }
 
   /** Draw a look, all of it at once. @param {Context} context @param {Camera} camera @param {Look} look
-   * @returns {boolean} */
-  draw(context, camera, look) {
+   * @param {import('./picture.js').Held} [held] @returns {boolean} */
+  draw(context, camera, look, held = this) {
+    [this.near, this.held] = [held.near, held.held];
     const { theme, constants } = this.scene,
       { margin, font } = this,
       count = this.rows.length,

@@ -4,7 +4,6 @@
 
 import { refOf } from './protocol.js';
 import { pixelsOf } from './save.js';
-import { PINS } from './strips.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./body.js').Body} Body */
@@ -153,9 +152,7 @@ export class Share {
 
   /** Pin curves by their names, and nothing else. @param {string} curves */
   pin(curves) {
-    const { strips } = this;
-    strips.pinned = [];
-    for (const line of curves.split('\n').slice(0, PINS)) {
+    const pinned = curves.split('\n').flatMap((line) => {
       const parts = line.split(WITH),
         names = parts.filter((one) => one[0] !== JOINED && one[0] !== AGAINST),
         beside = (/** @type {string} */ mark) =>
@@ -163,11 +160,11 @@ export class Share {
             .filter((one) => one[0] === mark)
             .map((one) => this.item(one.slice(1)))
             .filter(Boolean);
-      const items = names.map((name) => this.item(name));
-      if (items[0] && items.every(Boolean))
-        strips.put({ items, names: names.map((name) => name.split(OF)[0]) }, beside(JOINED), beside(AGAINST)[0]);
-    }
-    strips.list();
+      const items = names.map((name) => this.item(name)),
+        curve = { items, names: names.map((name) => name.split(OF)[0]) };
+      return items[0] && items.every(Boolean) ? [{ curve, joined: beside(JOINED), against: beside(AGAINST)[0] }] : [];
+    });
+    this.strips.only(pinned);
   }
 
   /** What an address says of this page. @returns {string} */

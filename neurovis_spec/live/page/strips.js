@@ -32,7 +32,7 @@ const SPIKE = 'spike';
 const RASTER = '*';
 
 /** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is, and how pale that of a future that was left; milliseconds between two traces that are asked for, and until one is asked for again. */
-export const PINS = 8;
+const PINS = 8;
 /** The most that is drawn at once: what joined curves are besides is left out. */
 const TRACED = 24,
   MARK = 6,
@@ -224,9 +224,18 @@ export class Strips {
     strip.join.focus();
   }
 
-  /** Pin the strips that a page begins with, as far as there is room for them, or so many. @param {Curve[]} curves @param {number} [most] */
-  begin(curves, most = Math.max(innerHeight < LOW ? 1 : 2, Math.floor((SHARE * innerHeight) / HIGH) - 1)) {
+  /** Pin the strips that a page begins with, as far as there is room for them. @param {Curve[]} curves */
+  begin(curves) {
+    const most = Math.max(innerHeight < LOW ? 1 : 2, Math.floor((SHARE * innerHeight) / HIGH) - 1);
     for (const curve of curves.slice(0, most)) this.put(curve);
+    this.list();
+  }
+
+  /** Pin these curves, as far as there is room, and nothing else: each with others in its axis, or against another, by what
+   * these are asked for. @param {{curve: Curve, joined: string[], against?: string}[]} curves */
+  only(curves) {
+    this.pinned = [];
+    for (const { curve, joined, against } of curves.slice(0, PINS)) this.put(curve, joined, against);
     this.list();
   }
 

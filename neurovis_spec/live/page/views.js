@@ -188,18 +188,23 @@ export class Views {
         if (id[0] === 'm' && ![...keys.values()].includes(id)) link.ask('unmeasure', { number: Number(id.slice(1)) });
     }
     for (const text of asked) link.ask('measure', { text });
-    strips.pinned = [];
-    for (const curve of curves) {
-      const [first, ...more] = curve.split(JOINING),
-        /** @type {Object<string, string[]>} */ beside = { over: [], with: [], against: [] };
-      for (let at = 0; at < more.length; at += 2) if (keys.get(more[at + 1])) beside[more[at]].push(more[at + 1]);
-      if (!keys.get(first) || strips.full) continue;
-      const names = [first, ...beside.over],
-        joined = beside.with.map((name) => keys.get(name) ?? ''),
-        [against] = beside.against.map((name) => keys.get(name) ?? '');
-      strips.put({ items: names.map((name) => keys.get(name) ?? ''), names }, joined, against);
-    }
-    strips.list();
+    strips.only(
+      curves.flatMap((curve) => {
+        const [first, ...more] = curve.split(JOINING),
+          /** @type {Object<string, string[]>} */ beside = { over: [], with: [], against: [] };
+        for (let at = 0; at < more.length; at += 2) if (keys.get(more[at + 1])) beside[more[at]].push(more[at + 1]);
+        if (!keys.get(first)) return [];
+        const names = [first, ...beside.over],
+          keyed = (/** @type {string[]} */ some) => some.map((name) => keys.get(name) ?? '');
+        return [
+          {
+            curve: { items: keyed(names), names },
+            joined: keyed(beside.with),
+            against: keyed(beside.against)[0],
+          },
+        ];
+      }),
+    );
     return unknown.filter((name) => !asked.includes(name));
   }
 
