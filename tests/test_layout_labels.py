@@ -292,8 +292,12 @@ def test_labels_where_neurons_have_positions_choose_sides_and_move_nobody() -> N
     network = nv.compile_text(text + "layout: {engine: spatial}\n")
     layout = network.layout().value
     assert layout.engine == "spatial"
-    assert overlaps(network, layout) == 0
-    assert len(set(layout.labels.values())) > 1
+    labels, discs, _, _ = shown(network)
+    written = [line for lines in labels.values() for line in lines if not line.on_disc]
+    assert {line.anchor for line in written} >= {"start", "end"}
+    assert not [(a.text, b.text) for a, b in combinations(written, 2) if meet(covers(a), covers(b))]
+    for (x, y), reach in [(disc.centre, disc.radius) for disc in discs.values()]:
+        assert not [line for line in written if meet(covers(line), (x - reach, y - reach, x + reach, y + reach))]
     bare = nv.compile_text(text + "layout: {engine: spatial}\nrender: {labels: false}\n").layout().value
     assert bare.positions == layout.positions
 
@@ -306,10 +310,10 @@ neurons: {A: {label: "a rather long name"}, B: {}, C: {}, D: {}}
 connections: {A -> B: 1, A -> C: 1, A -> D: 1}
 layout: {engine: manual, positions: {A: [0, 0], B: [5, 0], C: [0, 5], D: [0, -5]}}
 """)
-    assert network.layout().value.labels == {"A": "left"}
+    assert {line.anchor for line in shown(network)[0]["A"]} == {"end"}
 
 
-def test_of_equal_sides_a_label_takes_the_one_of_its_group_in_the_rank() -> None:
+def test_of_equal_sides_labels_of_one_line_take_the_same() -> None:
     network = nv.compile_text("""
 neurovis: 1
 name: aside
@@ -319,8 +323,8 @@ layout:
   engine: manual
   positions: {a_rather_long_name: [0, 0], another_long_name: [8, 0], B: [13, 0], a_name_of_no_group: [-6, 0]}
 """)
-    sides = network.layout().value.labels
-    assert sides == {"a_rather_long_name": "left", "another_long_name": "left", "a_name_of_no_group": "right"}
+    labels = shown(network)[0]
+    assert {line.anchor for lines in labels.values() for line in lines if not line.on_disc} == {"end"}
 
 
 def test_labels_of_mirror_images_stand_on_mirrored_sides_in_organic_layouts() -> None:

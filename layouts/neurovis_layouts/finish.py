@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from types import MappingProxyType
 
 import numpy as np
 
 from neurovis_layouts.boxed import boxes_apart
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.incremental import kept
-from neurovis_layouts.label_room import rect_of
-from neurovis_layouts.label_sides import best_sides, sided
+from neurovis_layouts.label_room import outward, rect_of
 from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing import RoutePlan, Surroundings, route_all
 from neurovis_layouts.routing.images import Images
@@ -39,13 +37,14 @@ def drawn(
     clear: Iterable[int] = (),
     within: Rect | None = None,
     symmetry: Symmetry | None = None,
-    sides: Mapping[str, Side] = MappingProxyType({}),
+    sides: Mapping[str, Side] | None = None,
 ) -> Layout:
     """The layout with the neurons at ``places`` (n, 2; there may be more rows than neurons), where no pin says
     otherwise. Instances without a pin are kept off the frames of those that have one. The edges ``clear``, by index,
     run straight, as the caller knows that nothing is in their way. Places that are data lie ``within`` a rectangle:
     then nothing is kept off a frame, and what is in the way of the other edges is gone round in there. With a
-    ``symmetry`` images, and routes between them, are exact reflections. On these ``sides`` labels have room."""
+    ``symmetry`` images, and routes between them, are exact reflections. Labels have room on these ``sides``,
+    else away from the middle."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
     for i, point in problem.pins.items():
         flat[i] = from_picture(point, problem.direction)
@@ -58,17 +57,18 @@ def drawn(
     plan, around = RoutePlan(there=there, images=images), Surroundings(within=within)
     routes = route_all(problem.edges, [*centres, *ghosts], plan, around, _CAREFUL)
     turned = problem.direction
+    shown = [to_picture(point, turned) for point in centres]
     fresh = Layout(
         problem.network,
         engine,
-        {name: to_picture(point, turned) for name, point in zip(problem.neurons, centres, strict=True)},
+        dict(zip(problem.neurons, shown, strict=True)),
         {
             edge.name: route if turned == "down" else tuple(to_picture(point, turned) for point in route)
             for edge, route in zip(problem.edges, routes, strict=True)
         },
-        sides,
+        outward(problem, shown) if sides is None else sides,
     )
-    return sided(problem, kept(problem, fresh, pins, around=within is None))
+    return kept(problem, fresh, pins, around=within is None)
 
 
 def drawn_apart(problem: LayoutProblem, engine: str, places: FloatArray, spacing: float, symmetry: Symmetry) -> Layout:
@@ -76,15 +76,12 @@ def drawn_apart(problem: LayoutProblem, engine: str, places: FloatArray, spacing
     nothing, as far as pins allow."""
     if not any(wide for wide, _ in problem.labels):
         return drawn(problem, engine, boxes_apart(problem, places, spacing, symmetry), symmetry=symmetry)
+    labels = np.full((len(places), 4), np.nan)
+    sides = outward(problem, [to_picture((x, y), problem.direction) for x, y in places.tolist()])
+    for i, name in enumerate(problem.neurons):
+        if name in sides:
+            labels[i] = rect_of(problem.labels[i], sides[name], problem.direction)
     for _ in range(_TRIES):
-        there = [to_picture((x, y), problem.direction) for x, y in places.tolist()]
-        ways = {edge.name: straight(there[edge.source], there[edge.target]) for edge in problem.edges}
-        rough = Layout(problem.network, engine, dict(zip(problem.neurons, there, strict=True)), ways)
-        sides = best_sides(problem, rough, freely=True)
-        labels = np.full((len(places), 4), np.nan)
-        for i, name in enumerate(problem.neurons):
-            if name in sides:
-                labels[i] = rect_of(problem.labels[i], sides[name], problem.direction)
         moved = boxes_apart(problem, places, spacing, symmetry, labels)
         layout = drawn(problem, engine, moved, symmetry=symmetry, sides=sides)
         if problem.pins or not label_overlaps(layout, problem):

@@ -2,16 +2,19 @@
 
 In: a problem whose ``labels`` say how large these are. Out: on which side of its disc each stands, what it covers
 there, how much farther apart neurons have to be for it. Where signals run down or up, labels stand at the sides; where
-they run across, below and above. Those of mirror images stand on the outer sides, all others on one side.
+they run across, below and above. Those of mirror images stand on the outer sides, all others on one side; where
+neurons stand anywhere, away from the middle. On which sides labels are drawn in the end the scene says, which knows how
+large the picture is (``neurovis_spec.scene.beside``).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from neurovis_layouts.frame import across_of, to_picture, turned
 from neurovis_spec.layout.frames import PAD_LABEL
-from neurovis_spec.layout.geometry import Rect, meet, padded
+from neurovis_spec.layout.geometry import Rect, meet, padded, snap
 from neurovis_spec.layout.labels import label_rect
 from neurovis_spec.layout.model import RADIUS, Direction, LayoutProblem, Point, Side
 
@@ -31,6 +34,21 @@ def sides_of(problem: LayoutProblem) -> tuple[Side | None, ...]:
     outer = flipped(usual, across_of(problem.direction))
     first = {a for mirror in problem.mirrors for a, b in mirror.pairs if a != b}
     return tuple(None if not wide else outer if i in first else usual for i, (wide, _) in enumerate(problem.labels))
+
+
+def outward(problem: LayoutProblem, places: Sequence[Point]) -> dict[str, Side]:
+    """On which sides of their discs, at these places in the picture, labels have room that nobody else keeps for them,
+    by neuron: where they stood in an earlier layout, else away from the middle."""
+    beside = [i for i, (wide, _) in enumerate(problem.labels) if wide]
+    if not beside:
+        return {}
+    before = problem.memory.labels if problem.memory else {}
+    across = [x for x, _ in places[: len(problem.neurons)]]
+    middle = math.fsum(across) / len(across)
+    return {
+        (name := problem.neurons[i]): before.get(name, "left" if snap(across[i] - middle) < 0 else "right")
+        for i in beside
+    }
 
 
 def best_first(direction: Direction) -> tuple[Side, ...]:

@@ -5,7 +5,7 @@ In: a problem in which everything is pinned. Out: the pins as they are, and rout
 
 from __future__ import annotations
 
-from neurovis_layouts.label_sides import sided
+from neurovis_layouts.label_room import outward
 from neurovis_layouts.routing import route_all
 from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 
@@ -22,10 +22,10 @@ class ManualEngine:
         """Keep every pin, route every edge."""
         centres = [problem.pins[i] for i in range(len(problem.neurons))]
         routes = route_all(problem.edges, centres)
-        layout = Layout(
+        return Layout(
             problem.network,
             self.name,
             dict(zip(problem.neurons, centres, strict=True)),
             {edge.name: route for edge, route in zip(problem.edges, routes, strict=True)},
+            outward(problem, centres),
         )
-        return sided(problem, layout)

@@ -17,7 +17,6 @@ from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import to_picture
 from neurovis_layouts.incremental import kept
 from neurovis_layouts.label_room import roomy
-from neurovis_layouts.label_sides import sided
 from neurovis_layouts.layered.drawing import Drawing
 from neurovis_layouts.packing import packed
 from neurovis_layouts.pins import fit, with_origins
@@ -105,9 +104,7 @@ def _placed(problem: LayoutProblem, engine: str, how: Arrangement, spacing: floa
     blocks = Blocks(problem, formation)
     free = blocks.whole() if problem.modules else blocks.formed(range(len(problem.neurons)))
     pins = with_origins(problem, dict(enumerate(free.places)))
-    layout = kept(problem, routed(free, problem.edges).layout(problem, engine), pins)
-    around = how == "ring" and not problem.pins and problem.memory is None  # the names of a ring stand outside of it
-    return layout if around else sided(problem, layout)
+    return kept(problem, routed(free, problem.edges).layout(problem, engine), pins)
 
 
 @dataclass(frozen=True, slots=True)

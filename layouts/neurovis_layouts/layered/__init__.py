@@ -35,12 +35,11 @@ class LayeredEngine:
         """Place every neuron and route every connection. Raises LayoutRefusalError for what cannot be met, such as
         lines that a formation cannot keep."""
         from neurovis_layouts.incremental import kept  # only here: who asks what it can do needs none of it
-        from neurovis_layouts.label_sides import sided
         from neurovis_layouts.layered.hierarchy import directed, drawn
 
         chosen = directed(problem)
         fresh = drawn(chosen, self.name)
-        found = sided(chosen, kept(chosen, fresh) if chosen.memory else fresh)
+        found = kept(chosen, fresh) if chosen.memory else fresh
         return found if chosen is problem else replace(found, direction=chosen.direction)
 
     def check(self, problem: LayoutProblem) -> None:
