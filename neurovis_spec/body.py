@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Protocol, cast
 
@@ -94,7 +94,9 @@ class Skeleton:
     """How a pose is drawn. A pose is ``size`` numbers: x, y, z of each point, in their order, then for each foot 1
     where it touches something and 0 where it does not.
 
-    ``points`` are names; ``feet`` and ``middle`` are indices of points, the latter what the picture follows.
+    ``points`` are names; ``feet`` and ``middle`` are indices of points, the latter what the picture follows. ``joints``
+    are the indices of the points at which the numbers of the actuators move the body, in their order, −1 where one
+    moves it at no point; a recording, which holds no commands, has none.
     """
 
     points: tuple[str, ...]
@@ -102,6 +104,7 @@ class Skeleton:
     feet: tuple[int, ...] = ()
     middle: int = 0
     solids: tuple[Solid, ...] = ()
+    joints: tuple[int, ...] = field(default=(), compare=False)
 
     @property
     def size(self) -> int:

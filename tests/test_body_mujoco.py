@@ -129,6 +129,19 @@ def test_of_several_touch_sensors_on_a_part_the_foot_is_at_its_end(tmp_path: Pat
     assert len(felt.feet) == len(plain.feet)
 
 
+def test_the_skeleton_says_which_points_the_actuators_move(tmp_path: Path) -> None:
+    """Two at the hip, which is where the leg begins; a tendon moves no single point."""
+    tendon = '<tendon><fixed name="rope"><joint joint="hip" coef="1"/></fixed></tendon><actuator>'
+    text = LEG.replace("<actuator>", tendon).replace("</actuator>", '<motor name="pull" tendon="rope"/></actuator>')
+    body = opened(tmp_path, text)
+    skeleton, pose = body.skeleton, body.pose()
+    assert skeleton is not None
+    assert [port.name for port in body.actuators] == ["hip", "push", "pull"]
+    first, second, third = skeleton.joints
+    assert pose[3 * first : 3 * first + 3].round(9).tolist() == [0.2, 0.3, 0.5]
+    assert (second, third) == (first, -1)
+
+
 def test_the_skeleton_has_links_feet_and_solids(tmp_path: Path) -> None:
     body = opened(tmp_path)
     skeleton = body.skeleton

@@ -16,6 +16,7 @@ from chromium import Page, chromium
 from PIL import Image
 from test_live_browser import STEP, pause
 from test_live_everyone import violations
+from toy_bodies import SKELETON, Cart, carted, registered
 
 import neurovis_spec as nv
 from neurovis_spec.body import Link, Solid
@@ -26,9 +27,10 @@ from neurovis_spec.live.live import listen
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import Server
+from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Source
 from neurovis_spec.live.view import view_of
-from neurovis_spec.scene import THEMES, channels
+from neurovis_spec.scene import THEMES, Theme, channels
 from neurovis_spec.scene.body import mixed
 
 pytestmark = pytest.mark.browser
@@ -45,10 +47,12 @@ SOLIDS = (Solid((-9, -9, -1), (9, 9, 0)), Solid((0.4, -0.4, 0), (0.5, 0.3, 0.03)
 
 
 @asynccontextmanager
-async def shown(source: Source, folder: Path, theme: str = "default") -> AsyncIterator[Page]:
+async def shown(
+    source: Source, folder: Path, theme: str = "default", network: nv.CompiledNetwork = NETWORK
+) -> AsyncIterator[Page]:
     """A live view of a source, paused at its first step."""
     hub = Hub(asyncio.get_running_loop(), REQUESTS)
-    run = Run(source, view_of(NETWORK, NETWORK.gains, theme), hub.show, lambda: hub.watched)
+    run = Run(source, view_of(network, network.gains, theme), hub.show, lambda: hub.watched)
     sock = listen("127.0.0.1", 0)
     access = Access("127.0.0.1", sock.getsockname()[1])
     server = Server(access, hub, run)
@@ -60,8 +64,7 @@ async def shown(source: Source, folder: Path, theme: str = "default") -> AsyncIt
             await opened.call("Page.navigate", url=access.url())
             await opened.until(f"{STEP} >= 0")
             await pause(opened)
-            await opened.ask("document.querySelector('#restart').click()")
-            await opened.until(f"{STEP} == 0")
+            await go(opened, 0)
             yield opened
             assert opened.errors == []
     finally:
@@ -238,6 +241,37 @@ def test_of_a_pose_that_is_not_known_nothing_is_drawn(tmp_path: Path) -> None:
             assert torso.sum() < 50
 
     asyncio.run(look())
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_joints_have_the_colours_of_what_moves_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, space: bool
+) -> None:
+    """Push, from -1 to 1, moves the cart: full colour at its ends. The two of the hand share its disc, each as large as
+    it has been."""
+    registered(monkeypatch)
+    monkeypatch.setattr(Cart, "skeleton", replace(SKELETON, joints=(0, 1, 1), solids=()))
+    network, theme = carted(), THEMES["default"]
+    push, source = 0.8 * network.run(40)["O1"], SimulatedSource(network.simulator())
+    for _ in range(39):
+        source.advance()
+
+    async def look() -> None:
+        async with shown(source, tmp_path, network=network) as opened:
+            if space:
+                await opened.ask("spatial.click()")
+            for step in (39, 25, 12):
+                await go(opened, step)
+                seen = await pixels(opened)
+                assert (seen == channels(shade(theme, float(push[step])))).all(axis=2).sum() >= 12
+            assert (seen == channels(theme.zero)).all(axis=2).sum() > 12, "the first of the hand is told nothing"
+
+    asyncio.run(look())
+
+
+def shade(theme: Theme, share: float) -> str:
+    """The colour of a share of the activity."""
+    return mixed(theme.negative if share < 0 else theme.positive, theme.zero, abs(share))
 
 
 async def drawn(opened: Page) -> None:

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 from bodies_by_hand import hexapod, posed
-from toy_bodies import SKELETON, carted, registered
+from toy_bodies import SKELETON, SPEC, Cart, carted, registered
 
 import neurovis_spec as nv
 from neurovis_spec.body import Link, Skeleton, skeleton_of
@@ -59,7 +59,7 @@ def sent(*several: Shown) -> list[bytes | str]:
 
 
 def poses(messages: list[bytes | str]) -> Iterator[list[float]]:
-    """The poses of the frames among messages."""
+    """The poses of the frames among messages, with what the motors are told behind them."""
     for message in messages:
         if isinstance(message, bytes) and message[0] == FRAME:
             count = struct.unpack_from("<H", message, 38)[0]
@@ -85,7 +85,47 @@ def test_a_body_that_runs_is_drawn_as_it_was_recorded_also_of_the_past() -> None
         assert one.glance.pose.tolist() == recording.pose[one.glance.step].astype(np.float32).tolist()
     assert [one.glance.step for one in seen[-3:]] == [17, 64, 3]
     messages = sent(*seen[:3], seen[-1])
-    assert list(poses(messages)) == [seen[at].glance.pose.tolist() for at in (0, 1, 2, -1)]
+    assert list(poses(messages)) == [
+        seen[at].glance.pose.tolist() + seen[at].glance.told.tolist() for at in (0, 1, 2, -1)
+    ]
+
+
+def test_what_moves_a_body_is_told_with_its_pose_also_of_the_past() -> None:
+    """By the formulas of the spec, from what was recorded: 0.8 O1 pushes, O2 − 2 O1 + π dt lifts the second joint."""
+    network = carted()
+    source, view = SimulatedSource(network.simulator()), view_of(network, network.gains)
+    recording = network.run(60)
+    drive, other = recording["O1"], recording["O2"]
+    wanted = np.stack([0.8 * drive, 0 * drive, other - 2 * drive + np.pi * 0.05], axis=1)
+    for step in [*range(60), 17, 41, 0]:
+        while source.reach.last < step:
+            source.advance()
+        source.go(step)
+        assert shown(source, view).glance.told == pytest.approx(wanted[step], rel=1e-6)
+
+
+def test_it_is_said_once_which_joints_the_motors_move_and_how_far_they_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    network = carted()
+    told: list[list[object]] = [["push", -1.0, 1.0], ["lift[0]", None, None], ["lift[1]", None, None]]
+    for joints, wanted in (((), (-1, -1, -1)), ((0, -1, 1), (0, -1, 1))):
+        monkeypatch.setattr(Cart, "skeleton", replace(SKELETON, joints=joints))
+        messages = sent(shown(SimulatedSource(network.simulator()), view_of(network, network.gains)))
+        assert [one["motors"] for one in bodies(messages)] == [
+            [[point, *rest] for point, rest in zip(wanted, told, strict=True)]
+        ]
+
+
+def test_of_commands_that_are_no_numbers_nothing_is_told() -> None:
+    """An episode that ends behind them takes none."""
+    spec = SPEC.replace("weight: 0.6", "weight: 1e308").replace("2, activation: tanh}\nconn", "2}\nconn")
+    network = carted(spec=spec.replace("episode: 40", "episode: 23"))
+    source, view = SimulatedSource(network.simulator()), view_of(network, carted().gains)
+    told = [len(shown(source, view).glance.told)]
+    for _ in range(22):
+        assert source.advance()
+        told.append(len(shown(source, view).glance.told))
+    assert told == [3] * 22 + [0]
+    assert len(shown(source, view).glance.pose) == SKELETON.size
 
 
 def test_how_it_is_drawn_is_sent_once_before_its_first_pose() -> None:
@@ -98,6 +138,7 @@ def test_how_it_is_drawn_is_sent_once_before_its_first_pose() -> None:
     kinds = [message[0] if isinstance(message, bytes) else json.loads(message)["type"] for message in messages]
     assert kinds == [SCENE, "status", "body", FRAME, FRAME]
     assert skeleton_of(json.dumps(told["skeleton"])) == SKELETON
+    assert told["motors"] == [[-1, "push", -1.0, 1.0], [-1, "lift[0]", None, None], [-1, "lift[1]", None, None]]
     assert told["start"] == pytest.approx(network.run(1).pose[0, :2].tolist())  # type: ignore[index]
 
 
@@ -112,6 +153,7 @@ def test_another_body_is_told_of_when_the_network_is_edited_and_none_where_it_ha
     read = [one["skeleton"] and skeleton_of(json.dumps(one["skeleton"])) for one in told]
     assert read == [skeleton, point, None]
     assert [len(pose) for pose in poses(messages)] == [skeleton.size, 3, 0]
+    assert [one["motors"] for one in told] == [[], [], []]
     assert [one["start"] for one in told] == [[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]]
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import product
 from typing import Final, NamedTuple
 
@@ -100,9 +101,25 @@ class Figure:
         self._place = np.array(self._places, dtype=np.float64).reshape(-1, 3)
         self._touch = np.array([foot.sensor for foot in feet], dtype=np.int64)
         self._geoms = [np.array(foot.geoms, dtype=np.int64) for foot in feet]
+        self._points = {body: [at for at, one in enumerate(self._bodies) if one == body] for body in moving}
         self.skeleton: Skeleton | None = None
         if moving:
             self.skeleton = Skeleton(tuple(self._names), tuple(links), points, middle, tuple(_solids(model)))
+
+    def moved_by(self, model: mujoco.MjModel, actuators: Iterable[int]) -> Skeleton | None:
+        """The skeleton with the joints of these actuators: of each the point that is nearest to the joint that it
+        moves, among those of the part that moves there."""
+        if self.skeleton is None:
+            return None
+        return replace(self.skeleton, joints=tuple(self._joint(model, actuator) for actuator in actuators))
+
+    def _joint(self, model: mujoco.MjModel, actuator: int) -> int:
+        if int(model.actuator_trntype[actuator]) not in _OF_JOINTS:
+            return -1
+        joint = int(model.actuator_trnid[actuator][0])
+        points = self._points.get(int(model.jnt_bodyid[joint]), [])
+        place = model.jnt_pos[joint]
+        return min(points, key=lambda at: float(np.linalg.norm(self._place[at] - place)), default=-1)
 
     def pose(self, data: mujoco.MjData) -> FloatArray:
         """What the skeleton is drawn from."""
@@ -139,6 +156,7 @@ class Figure:
 
 
 _FREE: Final = int(mujoco.mjtJoint.mjJNT_FREE)
+_OF_JOINTS: Final = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 _TOUCH: Final = int(mujoco.mjtSensor.mjSENS_TOUCH)
 _SPHERE: Final = int(mujoco.mjtGeom.mjGEOM_SPHERE)
 _CAPSULE: Final = int(mujoco.mjtGeom.mjGEOM_CAPSULE)

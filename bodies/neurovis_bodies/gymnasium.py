@@ -240,11 +240,12 @@ def _acted(space: spaces.Space[object]) -> tuple[Port, Callable[[FloatArray], ob
 def _pose_of(env: gymnasium.Env) -> tuple[Skeleton, Callable[[gymnasium.Env], FloatArray]] | None:
     """The skeleton of an environment that is made with MuJoCo, and how its pose is found; None for others."""
     model = getattr(env.unwrapped, "model", None)
-    if not type(model).__module__.startswith("mujoco") or not hasattr(env.unwrapped, "data"):
+    if model is None or not type(model).__module__.startswith("mujoco") or not hasattr(env.unwrapped, "data"):
         return None
     from neurovis_bodies.figure import Figure
 
     figure = Figure(model)
-    if figure.skeleton is None:
+    skeleton = figure.moved_by(model, range(model.nu))
+    if skeleton is None:
         return None
-    return figure.skeleton, lambda env: figure.pose(env.unwrapped.data)
+    return skeleton, lambda env: figure.pose(env.unwrapped.data)

@@ -190,7 +190,7 @@ class MujocoBody:
         self._sensed, self._moved = _numbers(_sensors(model)), _numbers(_actuators(model))
         self.sensors: Sequence[Port] = tuple(port for port, _ in _sensors(model))
         self.actuators: Sequence[Port] = tuple(port for port, _ in _actuators(model))
-        self.skeleton = self._figure.skeleton
+        self.skeleton = self._figure.moved_by(model, self._moved.tolist())
         self.reset(0)
 
     def reset(self, seed: int) -> None:

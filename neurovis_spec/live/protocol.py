@@ -144,13 +144,14 @@ def held_message(content: bytes, version: int) -> bytes:
 
 def frame_message(glance: Glance, reach: Reach, version: int, serial: int, changed: npt.NDArray[np.int64]) -> bytes:
     """A frame: all colours, and of the ``changed`` items (connections, then neurons) widths, glows and kinds; and the
-    pose of the body."""
+    pose of the body with what its motors were told."""
     lines = len(glance.lines)
     of_lines = np.minimum(changed, max(lines - 1, 0))
     none = np.zeros(len(changed), np.uint16)
     widths, glows = (values[of_lines] if lines else none for values in (glance.widths, glance.glows))
     words = glance.caption.encode("utf-8", "replace")[:4096]
-    pose = glance.pose if len(glance.pose) <= _POSED else glance.pose[:0]
+    pose = np.concatenate([glance.pose, glance.told]) if len(glance.pose) else glance.pose
+    pose = pose if len(pose) <= _POSED else pose[:0]
     counts = len(words), len(pose)
     head = _HEAD.pack(FRAME, version, serial, len(changed), glance.step, reach.first, reach.last, *counts)
     colours = glance.discs.tobytes() + glance.lines.tobytes()
@@ -198,9 +199,10 @@ def body_message(body: Drawn) -> str:
     """How the pose is drawn that frames have from now on, and where the body was when the view began; null where there
     is nothing to draw."""
     skeleton = body.skeleton
-    if skeleton is None or skeleton.size > _POSED:
-        return _text("body", skeleton=None, start=[0.0, 0.0])
-    return _text("body", skeleton=json.loads(text_of(skeleton)), start=list(body.start))
+    if skeleton is None or skeleton.size + len(body.motors) > _POSED:
+        return _text("body", skeleton=None, start=[0.0, 0.0], motors=[])
+    motors = [[one.point, one.name, *(end if math.isfinite(end) else None for end in one[2:])] for one in body.motors]
+    return _text("body", skeleton=json.loads(text_of(skeleton)), start=list(body.start), motors=motors)
 
 
 def undefined_message(undefined: Undefined | None) -> str:

@@ -88,7 +88,8 @@ class SimulatedSource:
         #: how many turns were taken
         self._taken = 1 + max((entry.number for entry in turned), default=-1)
         self._begin(self._origin if begin is None else begin, turned, fed or {})
-        self.body = drawn(simulation.skeleton, tuple(simulation.sensors), self._seen.snapshot.pose)
+        pose, actuators = self._seen.snapshot.pose, tuple(simulation.actuators)
+        self.body = drawn(simulation.skeleton, tuple(simulation.sensors), pose, actuators)
 
     def _begin(self, state: State, turned: Sequence[Turned], fed: Mapping[str, tuple[float, ...]]) -> None:
         self._past = Past(self._room)
@@ -486,8 +487,18 @@ class SimulatedSource:
         if self._fading:
             seen = self._fading.follow(np.array([step]), activity[None], None if sent is None else sent[None])
             sent = self._fading.sent if self._fading.sends else sent
-        snapshot = Snapshot(step, activity, weights, previous, seen, pose, run.sensed, shown, sent, ends)
+        told = (seen, pose, run.sensed, shown, sent, ends, _told(run))
+        snapshot = Snapshot(step, activity, weights, previous, *told)
         return Seen(snapshot, *lesioned, held, run.probed(self._probe))
+
+
+def _told(run: Simulation) -> FloatArray | None:
+    """What the body is told behind a step; None without a body, and where that is no finite number, so that the run
+    ends there."""
+    try:
+        return run.commands
+    except BodyError:
+        return None
 
 
 def _middle(run: Simulation, pose: FloatArray | None) -> FloatArray:

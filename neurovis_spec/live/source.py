@@ -7,15 +7,15 @@ step by step, goes back as far as it remembers, and takes the user's changes (``
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.body import Skeleton
+from neurovis_spec.body import Port, Skeleton
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.futures import Futures
 from neurovis_spec.live.history import History
@@ -64,21 +64,41 @@ class Seen:
     states: FloatArray | None = None
 
 
+class Motor(NamedTuple):
+    """A number of an actuator: the point of the skeleton that it moves, −1 for none; its name; its range."""
+
+    point: int
+    name: str
+    low: float
+    high: float
+
+
 @dataclass(frozen=True, slots=True)
 class Drawn:
     """The body of what is shown: how its pose is drawn, None where there is nothing to draw, and what its sensors are
-    called; ``start`` is where its middle was when the view began, x and y in metres."""
+    called; ``start`` is where its middle was when the view began, x and y in metres. ``motors`` are of each number of
+    its actuators where it moves the body (a point of the skeleton), its name, the lowest and the highest command, where
+    those are known."""
 
     skeleton: Skeleton | None = None
     sensor_names: tuple[str, ...] = ()
     start: tuple[float, float] = (0.0, 0.0)
+    motors: tuple[Motor, ...] = ()
 
 
-def drawn(skeleton: Skeleton | None, sensor_names: tuple[str, ...], pose: FloatArray | None) -> Drawn:
-    """The body of what is shown from this pose on."""
+def drawn(
+    skeleton: Skeleton | None,
+    sensor_names: tuple[str, ...],
+    pose: FloatArray | None,
+    actuators: Sequence[Port] = (),
+) -> Drawn:
+    """The body of what is shown from this pose on, and what moves it."""
     if skeleton is None or pose is None or not skeleton.points:
         return Drawn(None, sensor_names)
-    return Drawn(skeleton, sensor_names, start_of(skeleton, pose))
+    numbers = [(name, port) for port in actuators for name in port.numbers]
+    places = skeleton.joints if len(skeleton.joints) == len(numbers) else (-1,) * len(numbers)
+    motors = tuple(Motor(at, name, port.low, port.high) for at, (name, port) in zip(places, numbers, strict=True))
+    return Drawn(skeleton, sensor_names, start_of(skeleton, pose), motors)
 
 
 #: No body.

@@ -67,8 +67,8 @@ class Glance:
     (m + n,): of each connection, then of each neuron, BAR where its line ends in a bar, or, where it is not NEGATIVE,
     in nothing, FAINT where it is lesioned, of a line NEGATIVE where its weight is, or its synapse says so, and in the
     higher bits how large the weight is; of a neuron CLAMPED where it is, and
-    UNDEFINED where its activity is no finite number. ``pose`` is that of the body, no numbers where there is none;
-    ``sums`` are those of bundles, but for single connections."""
+    UNDEFINED where its activity is no finite number. ``pose`` is that of the body, and ``told`` what moves it, no
+    numbers where there is none; ``sums`` are those of bundles, but for single connections."""
 
     step: int
     caption: str
@@ -78,6 +78,7 @@ class Glance:
     glows: npt.NDArray[np.uint16]
     kinds: npt.NDArray[np.uint8]
     pose: npt.NDArray[np.float32]
+    told: npt.NDArray[np.float32]
     sums: SumArray
 
 
@@ -135,7 +136,8 @@ class View:
             widths=_parts(shown.widths),
             glows=_parts(shown.glows),
             kinds=np.concatenate([of_lines, of_neurons]).astype(np.uint8),
-            pose=np.zeros(0, np.float32) if whole.pose is None else _metres(whole.pose),
+            pose=_short(whole.pose),
+            told=_short(whole.commands),
             sums=self.sums.at(snapshot.weights, ends, lines),
         )
 
@@ -365,10 +367,11 @@ def _levels(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int8]:
     return np.where(np.isnan(values), _NO_LEVEL, np.rint(np.nan_to_num(values, nan=0.0) * LEVELS)).astype(np.int8)
 
 
-def _metres(pose: FloatArray) -> npt.NDArray[np.float32]:
-    """A pose as a page gets it; what is too large for it is as good as nowhere."""
+def _short(numbers: FloatArray | None) -> npt.NDArray[np.float32]:
+    """Numbers of a body as a page gets them, none where they are not known; what is too large for it is as good as
+    nowhere."""
     with np.errstate(over="ignore"):
-        return pose.astype(np.float32)
+        return np.zeros(0, np.float32) if numbers is None else numbers.astype(np.float32)
 
 
 def _parts(widths: npt.NDArray[np.float64]) -> npt.NDArray[np.uint16]:

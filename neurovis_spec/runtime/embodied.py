@@ -134,9 +134,10 @@ class Embodied:
         probed = self._probe.now(state)
         with np.errstate(all="ignore"):
             values = self._commands(state.activity, state.conditions.parameters, probed)
-        result = np.zeros(self._size)
-        result[self._moves] = values
-        if not isfinite(result.dot(result)):  # one quick test; huge numbers fail it, too, and pass those below
+            result = np.zeros(self._size)
+            result[self._moves] = values
+            squares = result.dot(result)
+        if not isfinite(squares):  # one quick test; huge numbers fail it, too, and pass those below
             for one, value in zip(self._moved.values(), values, strict=True):
                 if not isfinite(value):
                     raise BodyError(f"the command of '{one.actuator}' is {float(value)}")

@@ -61,6 +61,8 @@ class Snapshot:
     shown: FloatArray | None = None
     sent: FloatArray | None = None
     ends: npt.NDArray[np.int8] | None = None
+    #: what the actuators of the body were told behind the step; None where that is not known
+    commands: FloatArray | None = None
 
     @property
     def told(self) -> FloatArray:

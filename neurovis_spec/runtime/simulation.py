@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from neurovis_spec import arguments
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.body import Skeleton
+from neurovis_spec.body import Port, Skeleton
 from neurovis_spec.compiler.events.changes import Clamp
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.events.settable import ParameterFormula
@@ -209,6 +209,17 @@ class Simulation:
     def given(self) -> FloatArray:
         """The vector of all inputs at the last step, (inputs,), a copy; 0 before the first."""
         return self._stepper.vector[: self.network.input_size].copy()
+
+    @property
+    def commands(self) -> FloatArray | None:
+        """What the actuators were told behind the last step, one number after the other; None without a body, and
+        before the first step. Raises BodyError where a command is no finite number."""
+        return None if self._body is None or self._state.k == 0 else self._body.commands(self._state)
+
+    @property
+    def actuators(self) -> Sequence[Port]:
+        """What moves the body; nothing without one."""
+        return () if self._body is None else self._body.body.actuators
 
     @property
     def pose(self) -> FloatArray | None:

@@ -3,10 +3,13 @@
  */
 
 import { channels } from './colours.js';
+import { Motors, pie } from './motors.js';
 import { Space } from './space.js';
 import { roundAbove, written } from './ticks.js';
 
+/** @typedef {import('./motors.js').Joint} Joint */
 /** @typedef {import('./protocol.js').Look} Look */
+/** @typedef {import('./protocol.js').Motor} Motor */
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./protocol.js').Skeleton} Skeleton */
 /** @typedef {import('./protocol.js').Theme} Theme */
@@ -106,6 +109,7 @@ export class Body {
     /** @type {Skeleton | null} */
     this.skeleton = null;
     this.start = [0, 0];
+    this.motors = new Motors([]);
     /** @type {Reach} */
     this.reach = { ahead: LEAST, aside: LEAST, low: 0, high: LEAST };
     /** how high each link reaches in the first pose; none before it @type {number[]} */
@@ -123,10 +127,11 @@ export class Body {
     new ResizeObserver(redraw).observe(canvas);
   }
 
-  /** Another body, or none. @param {Skeleton | null} skeleton @param {number[]} start */
-  use(skeleton, start) {
+  /** Another body, or none. @param {Skeleton | null} skeleton @param {number[]} start @param {Motor[]} motors */
+  use(skeleton, start, motors) {
     this.skeleton = skeleton;
     this.start = start;
+    this.motors = new Motors(motors);
     this.reach = { ahead: LEAST, aside: LEAST, low: 0, high: LEAST };
     this.tops = [];
     this.way = [];
@@ -152,12 +157,16 @@ export class Body {
     this.redraw();
   }
 
+  /** How many numbers a pose is; behind them are those that moved the body. @returns {number} */
+  get size() {
+    return this.skeleton ? 3 * this.skeleton.points.length + this.skeleton.feet.length : 0;
+  }
+
   /** The points of a pose, x, y and z each; null where it is not known. @param {Float32Array} pose
    * @returns {number[][] | null} */
   points(pose) {
-    const { skeleton } = this;
-    if (!skeleton || pose.length !== 3 * skeleton.points.length + skeleton.feet.length) return null;
-    if (!pose.every(Number.isFinite)) return null;
+    const { skeleton, size } = this;
+    if (!skeleton || pose.length < size || !pose.subarray(0, size).every(Number.isFinite)) return null;
     return skeleton.points.map((_, at) => Array.from(pose.subarray(3 * at, 3 * at + 3)));
   }
 
@@ -188,7 +197,8 @@ export class Body {
     context.font = `${FONT}px ${scene.constants.families.map((name) => JSON.stringify(name)).join()}`;
     context.lineCap = context.lineJoin = 'round';
     if (points) this.measure(points);
-    const touching = this.touching(look);
+    const touching = this.touching(look),
+      joints = this.motors.shown(look.pose.subarray(this.size), scene.theme);
     if (points && this.space.on) {
       const room = { left: EDGE, top: TITLE, wide: wide - 2 * EDGE, high: high - TITLE - EDGE },
         step = roundAbove((2 * APART * (this.reach.ahead + this.reach.aside)) / wide),
@@ -196,6 +206,7 @@ export class Body {
       this.space.paint(context, room, scene.theme, skeleton, this.reach, {
         points,
         touching,
+        joints,
         ways,
         step,
         start: this.start,
@@ -215,6 +226,7 @@ export class Body {
       if (points) {
         if (frame.up === 1) this.trail(context, frame, scene.theme);
         this.links(context, frame, scene.theme, points);
+        this.joints(context, frame, scene.theme, points, joints);
         this.feet(context, frame, scene.theme, points, touching);
       }
       context.restore();
@@ -253,7 +265,8 @@ export class Body {
 
   /** Which feet touch something. @param {Look} look @returns {boolean[]} */
   touching(look) {
-    return Array.from(look.pose.subarray(3 * (this.skeleton?.points.length ?? 0)), (value) => value > 0.5);
+    const { points = [], feet = [] } = this.skeleton ?? {};
+    return Array.from(look.pose.subarray(3 * points.length, 3 * points.length + feet.length), (value) => value > 0.5);
   }
 
   /** How far it reaches. @param {number[][]} points */
@@ -410,20 +423,35 @@ export class Body {
     return [x, y];
   }
 
+  /** Joints in the colours of what moves them. @param {CanvasRenderingContext2D} context @param {Frame} frame
+   * @param {Theme} theme @param {number[][]} points @param {Joint[]} joints */
+  joints(context, frame, theme, points, joints) {
+    for (const { point, colours } of joints) {
+      const isFar = frame.up === 2 && this.layer(points, [point]) < 0,
+        seen = isFar ? colours.map((one) => mixed(one, theme.box_fill, FAR)) : colours;
+      pie(context, this.spot(frame, points[point]), this.thickness(point) * frame.scale, seen, theme);
+    }
+  }
+
+  /** How thick what ends at a point is, in metres. @param {number} point @returns {number} */
+  thickness(point) {
+    const links = this.skeleton?.links ?? [];
+    return Math.max(0, ...links.filter((link) => endsOf(link).includes(point)).map((link) => link[2]));
+  }
+
   /** Feet, filled where they touch something, and these in front of the others. @param {CanvasRenderingContext2D} context @param {Frame} frame
    * @param {Theme} theme @param {number[][]} points @param {boolean[]} touching */
   feet(context, frame, theme, points, touching) {
-    const { feet = [], links = [] } = this.skeleton ?? {};
+    const { feet = [] } = this.skeleton ?? {};
     const ordered = feet.map((point, at) => ({ point, at, order: frame.up === 1 ? 0 : this.layer(points, [point]) }));
     ordered.sort((one, other) => one.order - other.order || Number(touching[one.at]) - Number(touching[other.at]));
     for (const { point, at, order } of ordered) {
-      const thick = Math.max(0, ...links.filter((link) => endsOf(link).includes(point)).map((link) => link[2]));
       const colours = touching[at] ? [theme.positive, theme.ink] : [theme.box_fill, theme.muted];
       const [fill, edge] = order < 0 ? colours.map((one) => mixed(one, theme.box_fill, FAR)) : colours;
       this.disc(
         context,
         this.spot(frame, points[point]),
-        Math.min(LARGE, Math.max(SMALL, FOOT * thick * frame.scale)),
+        Math.min(LARGE, Math.max(SMALL, FOOT * this.thickness(point) * frame.scale)),
         fill,
         edge,
       );

@@ -217,7 +217,7 @@ const link = new Link({
       share.status();
       views.status();
     } else if (message.type === 'values') attention.take(message);
-    else if (message.type === 'body') body.use(message.skeleton, message.start);
+    else if (message.type === 'body') body.use(message.skeleton, message.start, message.motors);
     else if (message.type === 'findings') controls.found(message);
     else if (message.type === 'undefined') notFinite.tell(message, controls.owner);
     else if (message.type === 'moved') placing.take(message);

@@ -44,6 +44,8 @@ import { isStill } from './camera.js';
  * @typedef {{id: string, first: number, every: number, bins: number, rows: number, ends: string[], cells: Uint8Array}} Raster */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
  *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array, pose: Float32Array, sums: Float32Array, added: Float32Array}} Look */
+/** A number that moves the body: at which of its points, −1 for none; its name, the lowest and the highest that it can be,
+ * where these are known. @typedef {[number, string, number | null, number | null]} Motor */
 /** How the pose of a body is drawn: links are two points and a radius in metres, solids the lowest and the highest corner.
  * @typedef {{points: string[], links: number[][], feet: number[], middle: number,
  *   solids: [number[], number[]][]}} Skeleton */
@@ -58,7 +60,7 @@ import { isStill } from './camera.js';
 /** Where a page stood; null of what it says nothing. @typedef {{step: number | null, speed: string | null, camera: number[] | null, curves: string[] | null,
  *   theme: string | null, closed: string[] | null}} SavedView */
 /** @typedef {Status | {type: 'views', file: string, views: Object<string, SavedView>, findings: string} | {type: 'values', step: number, values: Object<string, number | null>}
- *   | {type: 'body', skeleton: Skeleton | null, start: number[]}
+ *   | {type: 'body', skeleton: Skeleton | null, start: number[], motors: Motor[]}
  *   | {type: 'making', done: number, total: number}
  *   | {type: 'findings', text: string, errors: boolean}
  *   | Nonfinite

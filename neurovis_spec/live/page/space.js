@@ -4,15 +4,18 @@
  */
 
 import { channels } from './colours.js';
+import { pie } from './motors.js';
 
 /** @typedef {import('./protocol.js').Skeleton} Skeleton */
 /** @typedef {import('./protocol.js').Theme} Theme */
 /** @typedef {import('./body.js').Reach} Reach */
+/** @typedef {import('./motors.js').Joint} Joint */
 /** A point of the world in metres, x forward, y to the left, z up. @typedef {number[]} Point */
 /** Where the drawing stands, and pixels of a metre. @typedef {{left: number, top: number, wide: number, high: number}} Room */
 /** What is drawn as one, and how near it is. @typedef {{depth: number, draw: () => void}} Item */
-/** What is there to draw: where points are, which feet touch something, ways on the ground, the step of its grid and where
- * that begins. @typedef {{points: Point[], touching: boolean[], ways: number[][][], step: number, start: number[]}} Pose */
+/** What is there to draw: where points are, which feet touch something, joints in their colours, ways on the ground, the
+ * step of its grid and where that begins.
+ * @typedef {{points: Point[], touching: boolean[], joints: Joint[], ways: number[][][], step: number, start: number[]}} Pose */
 
 /** From where it is seen at first: radians to the left of straight ahead, and above the ground; the least and the most. */
 const ROUND = -0.9,
@@ -199,6 +202,7 @@ export class Space {
     const items = [
       ...skeleton.links.map((link, at) => this.link(context, theme, link, at, pose.points)),
       ...skeleton.solids.flatMap((solid) => this.solid(context, theme, solid, far)),
+      ...pose.joints.map((joint) => this.joint(context, theme, skeleton, joint, pose.points)),
       ...skeleton.feet.map((foot, at) => this.foot(context, theme, skeleton, foot, pose.points, pose.touching[at])),
     ];
     for (const { draw } of items.sort((one, other) => one.depth - other.depth)) draw();
@@ -267,6 +271,26 @@ export class Space {
     return { depth, draw };
   }
 
+  /** How thick what meets at a point is, in metres, and how near is what stands before all of it.
+   * @param {Skeleton} skeleton @param {number} point @param {Point[]} points */
+  meeting(skeleton, point, points) {
+    const own = skeleton.links
+        .map(([start, end, radius, ...beside]) => ({ ends: [start, end, ...beside], radius }))
+        .filter(({ ends }) => ends.includes(point)),
+      depths = own.map(({ ends }) => this.depth(middle(ends.map((at) => points[at]))));
+    return {
+      thick: Math.max(0, ...own.map(({ radius }) => radius)),
+      depth: Math.max(this.depth(points[point]), ...depths) + 1e-6,
+    };
+  }
+
+  /** A joint in the colours of what moves it, before the links that meet there. @param {CanvasRenderingContext2D} context
+   * @param {Theme} theme @param {Skeleton} skeleton @param {Joint} joint @param {Point[]} points @returns {Item} */
+  joint(context, theme, skeleton, { point, colours }, points) {
+    const { thick, depth } = this.meeting(skeleton, point, points);
+    return { depth, draw: () => pie(context, this.spot(points[point]), thick * this.centre.scale, colours, theme) };
+  }
+
   /** The faces of a convex hull that are turned to who looks. @param {CanvasRenderingContext2D} context
    * @param {Theme} theme @param {string} colour @param {Point[]} points @param {string} name @param {number} width */
   hull(context, theme, colour, points, name, width) {
@@ -316,9 +340,7 @@ export class Space {
   /** A foot, in front of the links that end there. @param {CanvasRenderingContext2D} context @param {Theme} theme
    * @param {Skeleton} skeleton @param {number} foot @param {Point[]} points @param {boolean} isDown @returns {Item} */
   foot(context, theme, skeleton, foot, points, isDown) {
-    const own = skeleton.links.filter(([start, end, , ...beside]) => [start, end, ...beside].includes(foot)),
-      thick = Math.max(0, ...own.map((link) => link[2])),
-      depths = own.map(([start, end, , ...beside]) => middle([start, end, ...beside].map((at) => points[at])));
+    const { thick, depth } = this.meeting(skeleton, foot, points);
     const draw = () => {
       context.beginPath();
       context.arc(
@@ -332,7 +354,7 @@ export class Space {
       context.fill();
       context.stroke();
     };
-    return { depth: Math.max(this.depth(points[foot]), ...depths.map((at) => this.depth(at))) + 1e-6, draw };
+    return { depth, draw };
   }
 }
 
