@@ -3,6 +3,7 @@
  */
 
 import { THUMB } from './scrubber.js';
+import { Sized } from './sized.js';
 import { roundAbove, written } from './ticks.js';
 
 /** @typedef {import('./scrubber.js').Scrubber} Scrubber */
@@ -14,10 +15,11 @@ const APART = 80,
 
 /** Draws the ticks, and says what time a step is. */
 export class Axis {
-  /** @param {Scrubber} scrubber @param {(id: string) => HTMLElement} find */
-  constructor(scrubber, find) {
+  /** @param {Scrubber} scrubber @param {(id: string) => HTMLElement} find @param {() => void} changed */
+  constructor(scrubber, find, changed) {
     this.scrubber = scrubber;
     this.canvas = /** @type {HTMLCanvasElement} */ (find('ticks'));
+    this.size = new Sized(this.canvas, changed);
     this.unit = find('unit');
     /** @type {Time} */
     this.time = null;
@@ -40,7 +42,7 @@ export class Axis {
   show() {
     const { canvas, scrubber } = this,
       { low, high } = scrubber,
-      { clientWidth: width, clientHeight: height } = canvas,
+      { wide: width, high: height } = this.size,
       layout = [width, height, devicePixelRatio, low, high].join(' ');
     if (layout === this.drawn || !width) return;
     this.drawn = layout;

@@ -264,7 +264,7 @@ const notFinite = new NotFinite(link, attention, part);
 const outline = new Outline(attention, beside, part, (id) => go(id));
 const scrubber = new Scrubber(link, part, redraw);
 const range = new Range(link, scrubber, part, redraw);
-const axis = new Axis(scrubber, part);
+const axis = new Axis(scrubber, part, redraw);
 const strips = new Strips(link, attention, beside, scrubber, axis, part('strips'), part('under'));
 const aside = new Aside(link, part, () => {
   room.arrange(aside.pictures);

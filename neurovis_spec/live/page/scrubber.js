@@ -2,6 +2,8 @@
  * The scrubber: the time axis, which strips share, the step on it, how far back it reaches, and what happened when.
  */
 
+import { Sized } from './sized.js';
+
 /** @typedef {import('./protocol.js').Status} Status */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Look} Look */
@@ -25,6 +27,7 @@ export class Scrubber {
     this.reach = find('reach');
     this.marks = /** @type {HTMLCanvasElement} */ (find('marks'));
     this.cursor = find('cursor');
+    this.size = new Sized(/** @type {HTMLElement} */ (this.scrub.parentElement), changed);
     this.sought = -KEPT;
     this.goal = 0;
     this.timer = 0;
@@ -122,16 +125,16 @@ export class Scrubber {
     const words = `back to ${first}`;
     if (this.reach.textContent !== words) this.reach.textContent = words;
     this.cursor.hidden = step < this.low || step > this.high;
-    const { offsetLeft, offsetWidth } = /** @type {HTMLElement} */ (scrub.parentElement);
-    const at = offsetLeft + THUMB + this.across(step) * (offsetWidth - 2 * THUMB);
+    const { left, wide } = this.size,
+      at = left + THUMB + this.across(step) * (wide - 2 * THUMB);
     this.cursor.style.transform = `translateX(${at.toFixed(1)}px)`;
-    this.mark(offsetWidth);
+    this.mark(wide);
   }
 
   /** Mark what happened: a filled triangle for an event of the spec, a ring for a turn. @param {number} width */
   mark(width) {
     const happened = this.happened(),
-      layout = [width, devicePixelRatio, this.low, this.high, ...happened].join(' ');
+      layout = happened.length ? [width, devicePixelRatio, this.low, this.high, ...happened].join(' ') : '';
     if (layout === this.drawn) return;
     this.drawn = layout;
     const { marks } = this,

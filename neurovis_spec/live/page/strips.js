@@ -6,6 +6,7 @@ import { signed } from './attention.js';
 import { again, COLOURS, offer, plane, taken } from './joining.js';
 import { namesOf } from './protocol.js';
 import { THUMB } from './scrubber.js';
+import { Seldom } from './seldom.js';
 import { dot } from './spikes.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
@@ -18,6 +19,8 @@ import { dot } from './spikes.js';
 /** @typedef {import('./protocol.js').Traces} Traces */
 /** @typedef {import('./scrubber.js').Scrubber} Scrubber */
 /** @typedef {import('./joining.js').Joined} Joined */
+/** How large a canvas is on the page, and in which colours it is drawn.
+ * @typedef {{width: number, height: number, line: string, ink: string}} Room */
 /** The ranges of a trace. @typedef {{trace: Float32Array, first: number, every: number}} Seen */
 /** What it shows of a neuron or a connection: its activity or weight where `what` is empty; `key` is what that is asked by,
  * `told` what it is called; behind it, in the same axis, `behind`; `names` and `seen` are the names
@@ -87,6 +90,7 @@ export class Strips {
     this.branch = null;
     this.called = '';
     this.timer = 0;
+    this.values = new Seldom(() => this.say());
     this.of(this.held, undefined);
     this.list();
   }
@@ -430,12 +434,20 @@ export class Strips {
     this.show();
   }
 
+  /** Say the values of now. */
+  say() {
+    for (const { key, value } of [...this.pinned, this.held]) {
+      const now = this.attention.values[key];
+      write(value, key && now !== undefined ? signed(now) : '');
+    }
+  }
+
   /** Ask for the traces of the steps on the axis, where others are known. */
   show() {
     const { look } = this.link;
     if (!look) return;
     const { low, high, events, known: turned } = this.scrubber,
-      width = Math.max(1, this.held.canvas.clientWidth - 2 * THUMB);
+      width = Math.max(1, this.axis.size.wide - 2 * THUMB);
     const traced = this.traced(),
       others = [...this.pinned, this.held].filter(({ what }) => what === RASTER),
       pairs = [...new Set(this.pinned.flatMap(({ key, against }) => (against ? [key, against.key] : [])))];
@@ -443,11 +455,7 @@ export class Strips {
         .filter(Boolean)
         .slice(0, TRACED),
       rasters = [...new Set(others.map(({ id }) => id))].slice(0, PINS);
-    for (const { key, value } of [...this.pinned, this.held]) {
-      const now = this.attention.values[key],
-        words = key && now !== undefined ? signed(now) : '';
-      if (value.textContent !== words) value.textContent = words;
-    }
+    this.values.ask();
     if (this.paired && this.pointed !== this.attention.values) this.pairs(this.paired);
     const every = Math.max(1, Math.ceil((high - low + 1) / Math.min(width, 2000))),
       now = performance.now();
@@ -485,13 +493,15 @@ export class Strips {
   /** Traces have come. @param {Traces} traces */
   take(traces) {
     this.waiting = false;
-    for (const strip of [...this.pinned, this.held]) {
+    const strips = [...this.pinned, this.held],
+      rooms = new Map(strips.map((strip) => [strip, roomOf(strip.canvas)])); // before anything is written
+    for (const [strip, room] of rooms) {
       const trace = traces.ranges.get(strip.key);
       const behind = strip.behind.flatMap((key) => traces.ranges.get(key) ?? []);
       const joined = strip.joined.flatMap(({ key }) => traces.ranges.get(key) ?? []);
       const left = this.left?.ranges.get(strip.key);
       if (trace && !strip.against)
-        this.paint(strip, trace, traces, { behind, joined, left }, traces.ranges.get(this.marks(strip)));
+        this.paint(strip, room, trace, traces, { behind, joined, left }, traces.ranges.get(this.marks(strip)));
     }
     this.left = null;
     this.show();
@@ -511,17 +521,17 @@ export class Strips {
           strip.canvas,
           strip.ends,
           raster,
-          ...this.blank(strip.canvas),
+          ...this.blank(strip.canvas, roomOf(strip.canvas)),
           `from step ${this.scrubber.low} to ${this.scrubber.high}`,
         );
     }
   }
 
   /** A canvas as large as it is shown, empty, and how far across it a step is.
-   * @param {HTMLCanvasElement} canvas @returns {[CanvasRenderingContext2D, (step: number) => number]} */
-  blank(canvas) {
-    const { clientWidth: width, clientHeight: height } = canvas,
-      context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d')),
+   * @param {HTMLCanvasElement} canvas @param {Room} room
+   * @returns {[CanvasRenderingContext2D, (step: number) => number]} */
+  blank(canvas, { width, height }) {
+    const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d')),
       [wide, high] = [width, height].map((length) => Math.floor(length * devicePixelRatio));
     // another size is other memory, which costs more than the lines
     if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
@@ -533,15 +543,14 @@ export class Strips {
 
   /** Draw a trace: a line, up and down in each bin where it has several steps; above it marks where it fires, unless the
    * trace itself shows that; behind it, wide and pale, others, and, pale, how the future went that was left.
-   * @param {Strip} strip @param {Float32Array} trace
+   * @param {Strip} strip @param {Room} place @param {Float32Array} trace
    * @param {Traces} traces @param {{behind: Float32Array[], joined: Float32Array[], left: Float32Array | undefined}} others @param {Float32Array} [spikes] */
-  paint(strip, trace, { first, every }, { behind, joined, left }, spikes) {
+  paint(strip, place, trace, { first, every }, { behind, joined, left }, spikes) {
     strip.seen = [trace, ...behind, ...joined].map((one) => ({ trace: one, first, every }));
     strip.left = left ? { trace: left, first, every } : null;
     const { canvas } = strip,
-      [context, x] = this.blank(canvas);
-    const { clientWidth: width, clientHeight: height } = canvas,
-      style = getComputedStyle(canvas),
+      [context, x] = this.blank(canvas, place),
+      { width, height, line, ink } = place,
       { scrubber } = this;
     let [low, high] = [Infinity, -Infinity];
     for (const one of [trace, ...behind, ...joined, ...(left ? [left] : [])]) {
@@ -553,12 +562,11 @@ export class Strips {
     const known = low <= high,
       top = fired ? 4 + MARK : 4,
       room = height - 4 - top;
-    [high, low].forEach((end, at) => {
-      strip.ends[at].textContent = known && (at === 0 || high > low) ? short(end) : '';
-    });
+    write(strip.ends[0], known ? short(high) : '');
+    write(strip.ends[1], known && high > low ? short(low) : '');
     /** @param {number} value */
     const y = (value) => top + room * (high > low ? (high - Math.min(high, Math.max(low, value))) / (high - low) : 0.5);
-    context.strokeStyle = style.borderTopColor;
+    context.strokeStyle = line;
     context.setLineDash([2, 3]);
     context.beginPath();
     for (const [step] of scrubber.happened()) {
@@ -571,7 +579,7 @@ export class Strips {
     }
     context.stroke();
     context.setLineDash([]);
-    context.strokeStyle = style.color;
+    context.strokeStyle = ink;
     context.lineWidth = 1.2;
     context.lineJoin = 'round';
     for (let bin = 0; fired && 2 * bin < fired.length; bin++) {
@@ -603,7 +611,7 @@ export class Strips {
       context.strokeStyle = COLOURS[at % COLOURS.length];
       follow(context, other, middle, y);
     }
-    context.strokeStyle = style.color;
+    context.strokeStyle = ink;
     follow(context, trace, middle, y);
     const went = left?.some(Number.isFinite) ? `, behind it ${this.called || 'how it went before'}` : '';
     canvas.setAttribute(
@@ -613,6 +621,18 @@ export class Strips {
         : `${strip.told}: nothing is known of these steps`,
     );
   }
+}
+
+/** Where a strip is drawn. @param {HTMLCanvasElement} canvas @returns {Room} */
+function roomOf(canvas) {
+  const { clientWidth: width, clientHeight: height } = canvas,
+    { borderTopColor: line, color: ink } = getComputedStyle(canvas);
+  return { width, height, line, ink };
+}
+
+/** Have an element say something. @param {HTMLElement} place @param {string} words */
+function write(place, words) {
+  if (place.textContent !== words) place.textContent = words;
 }
 
 /** Draw a line through bins: up and down in each that has several steps.
