@@ -15,9 +15,9 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.diagnostics import Findings, SpecError
 from neurovis_spec.live.clock import SPEEDS
-from neurovis_spec.live.commands import Keep
+from neurovis_spec.live.commands import Keep, Rekeep, Unkeep
 from neurovis_spec.live.protocol import ProtocolError, command_of, views_message
-from neurovis_spec.live.saved_views import SavedView, file_beside, keep, views_in
+from neurovis_spec.live.saved_views import SHOWN, SavedView, call, file_beside, forget, keep, views_in
 
 TEXT = """neurovis: 1
 name: x
@@ -38,6 +38,7 @@ views = st.builds(
     curves=st.lists(st.sampled_from(CURVES), max_size=4).map(tuple),
     theme=st.sampled_from(["", "dark", "default", "print"]),
     closed=st.lists(texts, max_size=3).map(tuple),
+    shows=st.none() | st.sampled_from(SHOWN),
 )
 
 
@@ -58,6 +59,63 @@ def test_what_is_saved_is_read_again_and_comments_stay(
     assert findings.sorted() == ()
     text = path.read_text(encoding="utf-8")
     assert all(comment in text for comment in ("# first", "# of mine", "# why", "# last"))
+
+
+STYLES = {
+    "block": "neurovis_view: 1\nviews:\n  # of mine\n  mine: {step: 3} # why\n  other:\n    step: 4 # four\n# last\n",
+    "braces": "neurovis_view: 1\nviews: {mine: {step: 3}, other: {step: 4}} # last\n",
+    "lines": "neurovis_view: 1\nviews: {\n  # of mine\n  mine: {step: 3}, # why\n  other: {step: 4},\n}\n# last\n",
+}
+
+
+@given(
+    style=st.sampled_from(sorted(STYLES)),
+    more=st.lists(st.tuples(texts, views), max_size=2),
+    taken=st.lists(st.tuples(st.sampled_from(["mine", "other", ""]), texts | st.just("")), min_size=1, max_size=4),
+)
+@settings(max_examples=30, deadline=None)
+def test_a_view_is_called_otherwise_or_taken_out_and_all_else_stays(
+    tmp_path_factory: pytest.TempPathFactory,
+    style: str,
+    more: list[tuple[str, SavedView]],
+    taken: list[tuple[str, str]],
+) -> None:
+    """As a dict does it. No name is that of the view that was saved last, and to be called nothing to be taken out."""
+    path = tmp_path_factory.mktemp("views") / "x.neurovis-view.yaml"
+    path.write_text(STYLES[style], encoding="utf-8")
+    wanted = {"mine": SavedView(3), "other": SavedView(4)}
+    for name, view in more:
+        keep(path, name, view)
+        wanted[name] = view
+    for name, to in taken:
+        of = name or (more[-1][0] if more else "mine")
+        before = path.read_bytes()
+        if of not in wanted or (to != of and to in wanted):
+            with pytest.raises((KeyError, ValueError)):
+                call(path, of, to) if to else forget(path, of)
+            assert path.read_bytes() == before
+        elif to:
+            call(path, of, to)
+            wanted[to] = wanted.pop(of)
+        else:
+            forget(path, of)
+            del wanted[of]
+        findings = Findings()
+        assert views_in(path, NETWORK, findings) == wanted
+        assert findings.sorted() == ()
+    assert "# last" in path.read_text(encoding="utf-8")
+
+
+def test_a_view_without_some_keys_is_put_back_without_them(tmp_path: Path) -> None:
+    path = tmp_path / "x.neurovis-view.yaml"
+    path.write_text("neurovis_view: 1\nviews:\n  a: {step: 3}\n  b: {theme: dark} # mine\n")
+    forget(path, "a")
+    keep(path, "a", SavedView(3))
+    keep(path, "b", SavedView(4))
+    keep(path, "c", SavedView())
+    assert path.read_text().splitlines()[2:] == [
+        "  b:  # mine", "    theme: null", "    step: 4", "  a:", "    step: 3", "  c: {}"
+    ]  # fmt: skip
 
 
 WRONG = """\
@@ -105,16 +163,20 @@ def test_what_is_wrong_has_its_place_and_the_rest_is_there(tmp_path: Path) -> No
 
 def test_a_page_sends_all_of_a_view_and_is_told_all_of_them() -> None:
     view = {"step": 3, "speed": "max", "camera": [1.5, 0, -2], "curves": ["A1"], "theme": "", "closed": []}
-    wanted = SavedView(3, "max", (1.5, 0.0, -2.0), ("A1",), "", ())
+    view["shows"] = "matrix"
+    wanted = SavedView(3, "max", (1.5, 0.0, -2.0), ("A1",), "", (), "matrix")
 
     def message(**more: object) -> str:
         return json.dumps({"type": "keep", "name": " a  b", "view": {**view, **more}})
 
     assert command_of(message()) == Keep("a b", wanted)
+    assert command_of(message(**dict.fromkeys(view))) == Keep("a b", SavedView())
+    assert command_of('{"type": "unkeep", "name": "a  b"}') == Unkeep("a  b")
+    assert command_of('{"type": "rekeep", "name": "a  b", "to": " c  d"}') == Rekeep("a  b", "c d")
     assert json.loads(views_message("x", {"a": wanted}, ""))["views"] == {"a": view}
     for wrong in (
         {"step": -1}, {"speed": "3"}, {"camera": [0, 1, 2]}, {"camera": [1, 2]}, {"curves": [3]}, {"theme": "x"},
-        {"closed": "a"}, {"more": 1}, {"camera": [1, 2, 1e301]}, {"curves": ["x"] * 2000},
+        {"closed": "a"}, {"shows": "body"}, {"more": 1}, {"camera": [1, 2, 1e301]}, {"curves": ["x"] * 2000},
     ):  # fmt: skip
         with pytest.raises(ProtocolError):
             command_of(message(**wrong))

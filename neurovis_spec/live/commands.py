@@ -239,6 +239,21 @@ class Keep:
     view: SavedView
 
 
-Request: TypeAlias = PlaceNeuron | Unplace | Save | Write | Fetch | Keep
+@dataclass(frozen=True, slots=True)
+class Unkeep:
+    """Take a view out of the file of views."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rekeep:
+    """Have a view of the file of views be called otherwise."""
+
+    name: str
+    to: str
+
+
+Request: TypeAlias = PlaceNeuron | Unplace | Save | Write | Fetch | Keep | Unkeep | Rekeep
 #: the messages that ask for them
-REQUESTS: Final = frozenset(("place", "unplace", "save", "write", "fetch", "keep"))
+REQUESTS: Final = frozenset(("place", "unplace", "save", "write", "fetch", "keep", "unkeep", "rekeep"))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -18,7 +18,19 @@ from typing import Final, TypeAlias, TypeVar
 from neurovis_spec.compilation import Compilation
 from neurovis_spec.diagnostics import Findings, SpecError, show_text
 from neurovis_spec.layout.model import Layout
-from neurovis_spec.live.commands import STILLS, Appearance, Fetch, Keep, PlaceNeuron, Request, Save, Unplace, Write
+from neurovis_spec.live.commands import (
+    STILLS,
+    Appearance,
+    Fetch,
+    Keep,
+    PlaceNeuron,
+    Rekeep,
+    Request,
+    Save,
+    Unkeep,
+    Unplace,
+    Write,
+)
 from neurovis_spec.live.pins import Compile, File, Placed, Saving, SavingError, placed, saving
 from neurovis_spec.live.protocol import (
     file_message,
@@ -30,11 +42,12 @@ from neurovis_spec.live.protocol import (
     views_message,
 )
 from neurovis_spec.live.run import Run, Stage
-from neurovis_spec.live.saved_views import file_beside, keep, views_in
+from neurovis_spec.live.saved_views import call, file_beside, forget, keep, views_in
 from neurovis_spec.live.saving import film, picture, recording, steps_for, told_by
 from neurovis_spec.live.source import Source, SourceError
 from neurovis_spec.live.turns import Turned
 from neurovis_spec.live.view import View
+from neurovis_spec.live.watch import Watch
 from neurovis_spec.live.with_events import WithEvents, with_events
 from neurovis_spec.progress import Progress
 
@@ -84,18 +97,24 @@ class Desk:
         self._wake, self._work_lock = Condition(), RLock()
         self._ended = False
         self._thread = Thread(target=self._work, name="live desk", daemon=True)
+        #: has the views be read again when anybody has edited their file
+        self._watch = None if spec is None else Watch({file_beside(spec.path)}, self._edited)
 
     def start(self) -> None:
         """Begin."""
         self._say()
         self._say_views()
         self._thread.start()
+        if self._watch is not None:
+            self._watch.start()
 
     def end(self) -> None:
         """Stop; a layout that is being made is not waited for long."""
         with self._wake:
             self._ended = True
             self._wake.notify()
+        if self._watch is not None:
+            self._watch.end()
         self._thread.join(1.0)
 
     def ask(self, request: Request, answer: Answer) -> None:
@@ -175,7 +194,13 @@ class Desk:
             case Write():
                 self._write(answer)
             case Keep():
-                keep(file_beside(self._written().path), request.name, request.view)
+                keep(self._views(), request.name, request.view)
+                self._say_views()
+            case Unkeep():
+                forget(self._views(), request.name)
+                self._say_views()
+            case Rekeep():
+                call(self._views(), request.name, request.to)
                 self._say_views()
             case Fetch(what="yaml"):
                 # what was shown, if anything was
@@ -231,6 +256,9 @@ class Desk:
             raise SavingError("there is no file to save to")
         return self._spec
 
+    def _views(self) -> Path:
+        return file_beside(self._written().path)
+
     def _write(self, answer: Answer) -> None:
         spec, chosen = self._written(), self._saving
         if chosen is None:
@@ -274,6 +302,12 @@ class Desk:
             path, findings = file_beside(self._spec.path), Findings()
             views = views_in(path, self._placed.compiled.network, findings)
             self._tell(views_message(path.name, views, show_text(findings.sorted(), findings.sources)))
+
+    def _edited(self) -> Iterable[Path]:
+        """The file of views was edited."""
+        with self._work_lock:
+            self._say_views()
+            return {self._views()}
 
     def _say(self) -> None:
         """Tell everybody what is put by hand."""

@@ -42,6 +42,7 @@ from neurovis_spec.live.commands import (
     Pause,
     PlaceNeuron,
     Play,
+    Rekeep,
     Rename,
     Request,
     Restart,
@@ -52,6 +53,7 @@ from neurovis_spec.live.commands import (
     Step,
     Switch,
     Undo,
+    Unkeep,
     Unloop,
     Unmeasure,
     Unplace,
@@ -63,7 +65,7 @@ from neurovis_spec.live.futures import Future
 from neurovis_spec.live.held import KINDS
 from neurovis_spec.live.history import Bins, Range
 from neurovis_spec.live.run import Status
-from neurovis_spec.live.saved_views import SavedView
+from neurovis_spec.live.saved_views import SHOWN, SavedView
 from neurovis_spec.live.saving import MOST_SECONDS
 from neurovis_spec.live.source import Drawn, Reach
 from neurovis_spec.live.sums import SumArray
@@ -477,20 +479,20 @@ def _speed(value: object) -> float:
 def _view(value: object) -> SavedView:
     if not isinstance(value, dict) or set(value) != set(SavedView.__slots__):
         raise ProtocolError("all of a view is wanted")
-    _speed(value["speed"])
-    return SavedView(
-        step=_whole(0, _MOST)(value["step"]),
-        speed=str(value["speed"]),
-        camera=_camera(value["camera"]),
-        curves=_texts(value["curves"]),
-        theme=_theme(value["theme"]),
-        closed=_texts(value["closed"]),
-    )
+    checks: dict[str, Check] = {
+        "step": _whole(0, _MOST),
+        "speed": _one_of(*SPEEDS),
+        "camera": _camera,
+        "curves": _texts,
+        "theme": _theme,
+        "closed": _texts,
+        "shows": _one_of(*SHOWN),
+    }
+    made: Callable[..., SavedView] = SavedView
+    return made(**{name: None if value[name] is None else check(value[name]) for name, check in checks.items()})
 
 
-def _camera(value: object) -> tuple[float, float, float] | None:
-    if value is None:
-        return None
+def _camera(value: object) -> tuple[float, float, float]:
     if not isinstance(value, list) or len(value) != 3:
         raise ProtocolError("a camera is wanted")
     zoom, x, y = (_number(number) for number in value)
@@ -651,6 +653,8 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "save": ({"into": _one_of(*get_args(Into))}, Save),
     "write": ({}, Write),
     "keep": ({"name": _view_name, "view": _view}, Keep),
+    "unkeep": ({"name": _name}, Unkeep),
+    "rekeep": ({"name": _name, "to": _view_name}, Rekeep),
     "fetch": ({"what": _one_of(*get_args(What)), "seconds": _seconds}, Fetch),
 }
 #: Members that a message need not have.

@@ -18,7 +18,7 @@ from typing import Final
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.format.edit import Path as Keys
-from neurovis_spec.language.format.edit import Value, put
+from neurovis_spec.language.format.edit import Value, put, recalled, without
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST, read_content
 from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, describe
@@ -39,7 +39,9 @@ FARTHEST: Final = (1 << 53) - 1
 MOST: Final = 1024
 _NEW: Final = f"neurovis_view: {VERSION}\n"
 _KEYS: Final = ("neurovis_view", "views")
-_OF_VIEW: Final = ("step", "speed", "camera", "curves", "theme", "closed")
+_OF_VIEW: Final = ("step", "speed", "camera", "curves", "theme", "closed", "shows")
+#: What a page can show: views of the network, as ``render`` calls them.
+SHOWN: Final = ("network", "matrix", "pathways")
 #: A line that is neither blank nor a comment.
 _SAID: Final = re.compile(rb"(?:\xef\xbb\xbf)?\s*[^\s#]")
 #: What joins the signals of one curve: behind the first, in the same axis, in a plane.
@@ -50,8 +52,8 @@ _JOINING: Final = re.compile(r" (?:over|with|against) ")
 class SavedView:
     """Where a page stood: its ``step``, its ``speed`` (a key of ``SPEEDS``), its ``camera`` (how many times as large as
     the whole picture fits into the window; the units of the layout in the middle), its ``curves`` by what they show,
-    its ``theme`` ("" is that of the spec), and the boxes that are ``closed`` by hand. What is None
-    stays as it is."""
+    its ``theme`` ("" is that of the spec), the boxes that are ``closed`` by hand, and what it ``shows`` (one of
+    ``SHOWN``). What is None stays as it is."""
 
     step: int | None = None
     speed: str | None = None
@@ -59,6 +61,7 @@ class SavedView:
     curves: tuple[str, ...] | None = None
     theme: str | None = None
     closed: tuple[str, ...] | None = None
+    shows: str | None = None
 
 
 def file_beside(spec: Path) -> Path:
@@ -93,9 +96,7 @@ def views_in(path: Path, network: Network, findings: Findings) -> dict[str, Save
 def keep(path: Path, name: str, view: SavedView) -> None:
     """Put a view into a file, in place of one of this name; the file is written as a whole. Raises SpecError where what
     is there cannot be read, ValueError for a text that cannot be seen, OSError."""
-    for text in (name, *(view.curves or ()), *(view.closed or ())):
-        if not text.isprintable():
-            raise ValueError(f"what is saved holds characters that cannot be seen: {text!r}")
+    _check_seen(name, *(view.curves or ()), *(view.closed or ()))
     findings = Findings()
     root = _root(path, findings)
     findings.check()
@@ -110,14 +111,49 @@ def keep(path: Path, name: str, view: SavedView) -> None:
         file.write(_with(text, views, name, view).encode())
 
 
+def forget(path: Path, name: str) -> None:
+    """Take a view out of a file, which is written as a whole. Raises SpecError where what is there cannot be read,
+    KeyError where there is no such view, OSError."""
+    _edit(path, name, lambda text: without(text, ("views", name)))
+
+
+def call(path: Path, name: str, to: str) -> None:
+    """Have a view of a file be called otherwise; the file is written as a whole. Raises as ``forget`` does, and
+    ValueError for a name that cannot be seen or that another view has."""
+    _check_seen(to)
+    _edit(path, name, lambda text: recalled(text, ("views", name), _text(to)), to)
+
+
+def _edit(path: Path, name: str, edited: Callable[[str], str], to: str | None = None) -> None:
+    findings = Findings()
+    root = _root(path, findings)
+    findings.check()
+    views = None if root is None else root.get("views")
+    if not isinstance(views, Entries) or views.entry(name) is None:
+        raise KeyError(f"there is no view '{name}' in {path.name}")
+    if to is not None and to != name and views.entry(to) is not None:
+        raise ValueError(f"another view is called '{to}'")
+    text = path.read_bytes().decode("utf-8-sig")
+    with replacing(path) as file:
+        file.write(edited(text).encode())
+
+
+def _check_seen(*texts: str) -> None:
+    for text in texts:
+        if not text.isprintable():
+            raise ValueError(f"what is saved holds characters that cannot be seen: {text!r}")
+
+
 def _with(text: str, views: Node | None, name: str, view: SavedView) -> str:
     """A text with a view in it. Of one that is there each value is replaced by itself, so that comments stay."""
-    is_there = isinstance(views, Entries) and views.entry(name) is not None
-    key = name if is_there else _text(name)
+    before = views.get(name) if isinstance(views, Entries) else None
+    key = _text(name) if before is None else name
     values: dict[Keys, Value] = {}
     for what in _OF_VIEW:
-        values["views", key, what] = _cells(getattr(view, what))
-    return put(text, values)
+        value = getattr(view, what)
+        if value is not None or (isinstance(before, Entries) and before.entry(what) is not None):
+            values["views", key, what] = _cells(value)
+    return put(text, values or {("views", key): "{}"})
 
 
 def _cells(value: int | str | tuple[float | str, ...] | None) -> Value:
@@ -170,6 +206,7 @@ def _view(name: str, node: Node, known: Callable[[str], bool], findings: Finding
         None if curves is None else tuple(curve for curve, span in curves if _is_there(curve, span, known, findings)),
         _one_of(given("theme"), "theme", {"": "", **THEMES}, findings),
         _plain(_texts(given("closed"), "closed", findings)),
+        _one_of(given("shows"), "shows", {one: one for one in SHOWN}, findings),
     )
 
 

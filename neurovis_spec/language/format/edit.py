@@ -6,6 +6,7 @@ the text are replaced; where blanks and line breaks belong is the formatter's co
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from collections.abc import Mapping as Values
 from typing import Final, NamedTuple, TypeAlias
@@ -15,7 +16,7 @@ from neurovis_spec.language.format.canonical import format_read, with_line_feeds
 from neurovis_spec.language.format.gaps import read_gap
 from neurovis_spec.language.format.printer import Source, is_empty
 from neurovis_spec.language.yaml.reader import read_text
-from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Scalar
+from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar
 
 #: The keys that lead to a value.
 Path: TypeAlias = tuple[str, ...]
@@ -25,6 +26,8 @@ Value: TypeAlias = "str | tuple[str, ...]"
 _Tree: TypeAlias = "dict[str, _Tree | Value]"
 
 _STEP: Final = 2
+#: The comma behind an entry in braces.
+_COMMA: Final = re.compile(r"[ \n]*,")
 
 
 class _Edit(NamedTuple):
@@ -61,6 +64,58 @@ def put(text: str, values: Values[Path, Value]) -> str:
     for start, stop, written in reversed(edits):
         plain = plain[:start] + written + plain[stop:]
     return format_read(plain)
+
+
+def without(text: str, path: Path) -> str:
+    r"""The text of a spec, which the reader has accepted, without the entry to which keys lead, and what is said on its
+    lines. Raises KeyError where there is none.
+
+    >>> print(without("# all\na:\n  b: 2  # why\n  # of c\n  c: 3\n", ("a", "b")), end="")
+    # all
+    a:
+      # of c
+      c: 3
+    """
+    plain = with_line_feeds(text)
+    source, node, entry = _found(plain, path)
+    begin, end = source.begin(entry.key), source.end(entry.value)
+    if source.is_block(node):
+        begin, end = plain.rfind("\n", 0, begin) + 1, plain.index("\n", end) + 1
+    elif comma := _COMMA.match(plain, end):
+        end = comma.end()
+    elif len(node.entries) > 1:  # the last one goes with the comma before it
+        comma_at = plain.index(",", source.end(node.entries[-2].value))
+        plain, begin, end = plain[:comma_at] + plain[comma_at + 1 :], begin - 1, end - 1
+    return format_read(plain[:begin] + plain[end:])
+
+
+def recalled(text: str, path: Path, name: str) -> str:
+    r"""The text of a spec, which the reader has accepted, with another ``name``, as it is written, in place of the last
+    of the keys that lead to an entry. Raises KeyError where there is none.
+
+    >>> print(recalled("a:\n  b: 2  # why\n", ("a", "b"), "c"), end="")
+    a:
+      c: 2  # why
+    """
+    plain = with_line_feeds(text)
+    source, _, entry = _found(plain, path)
+    return format_read(plain[: source.begin(entry.key)] + name + plain[source.end(entry.key) :])
+
+
+def _found(plain: str, path: Path) -> tuple[Source, Mapping, Entry]:
+    """The entry to which keys lead, and the mapping in which it stands."""
+    document = read_text(plain, "", Findings())
+    assert document is not None
+    within = document.root
+    for key in path[:-1]:
+        node = within.get(key)
+        if not isinstance(node, Mapping):
+            raise KeyError(key)
+        within = node
+    entry = within.entry(path[-1])
+    if entry is None:
+        raise KeyError(path[-1])
+    return Source(plain), within, entry
 
 
 class _Editor:

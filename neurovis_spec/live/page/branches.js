@@ -2,6 +2,7 @@
  * Branches: what else the run has done, as a tree; gone to, compared, named and deleted.
  */
 
+import { button, retype } from './naming.js';
 import { told } from './told.js';
 
 /** @typedef {import('./protocol.js').Future} Future */
@@ -108,9 +109,15 @@ export class Branches {
       { current: number, named: name } = this;
     words.textContent = name ? `this run: ${name}` : 'this run';
     if (!this.owner) return [words];
-    const rename = this.button('rename', 'rename this run', () => this.rename({ number, name }, words));
+    const rename = button('rename', 'rename this run', () => this.rename({ number, name }, words));
     rename.className = 'small';
     return [words, rename];
+  }
+
+  /** Have the run go to a branch, so that it can be undone. @param {number} number @param {string} own */
+  enter(number, own) {
+    const to = (/** @type {number} */ one) => () => this.link.ask('switch', { number: one });
+    this.undo.whole({ words: `went to ${own}`, undo: to(this.current), redo: to(number) });
   }
 
   /** What can be done with a branch. @param {Future} future @returns {HTMLElement} */
@@ -119,17 +126,15 @@ export class Branches {
     const words = turned.map((entry) => `step ${entry.step + 1}: ${told(entry)}`).join('; ') || 'as it went',
       span = `from step ${at + 1} to ${last}`,
       own = called(future);
-    const go = this.button(
-      `${name ? `${name}, ` : ''}${span}: ${words}${older ? ' (of an older spec)' : ''}`,
-      '',
-      () => (older ? this.choose(number, own) : this.link.ask('switch', { number })),
+    const go = button(`${name ? `${name}, ` : ''}${span}: ${words}${older ? ' (of an older spec)' : ''}`, '', () =>
+      older ? this.choose(number, own) : this.enter(number, own),
     );
     go.className = 'go';
     go.title = older
       ? 'its curves can be shown beside; it cannot go on, as the spec is another one'
       : 'go there, to the same step';
     go.disabled = !this.owner && !older;
-    const beside = this.button('A | B', `A | B with ${own}`, () => {
+    const beside = button('A | B', `A | B with ${own}`, () => {
       const isShown = this.compared === number,
         show = (/** @type {number} */ which) => () => this.link.ask('compare', { number: which });
       const [now, back] = isShown ? [-1, number] : [number, this.compared ?? -1];
@@ -140,7 +145,7 @@ export class Branches {
     beside.setAttribute('aria-pressed', String(this.compared === number));
     beside.className = 'small';
     beside.title = 'its picture beside this one, at the same step';
-    const compare = this.button('compare', `compare with ${own}`, () =>
+    const compare = button('compare', `compare with ${own}`, () =>
       this.choose(this.chosen === number ? null : number, own),
     );
     compare.setAttribute('aria-pressed', String(this.chosen === number));
@@ -150,14 +155,14 @@ export class Branches {
     place.append(compare);
     if (this.owner && !older) place.append(beside);
     if (this.owner) {
-      const forget = this.button('delete', `delete ${own}`, () => {
+      const forget = button('delete', `delete ${own}`, () => {
         this.link.ask('forget', { number });
         const more = within.length ? `, and ${every(within).length} within it` : '';
         const again = { undo: () => this.link.ask('restore'), redo: () => this.link.ask('forget', { number }) };
         this.undo.act({ words: `deleted ${own}${more}`, ...again });
         this.undo.tell(`deleted ${own}${more}`);
       });
-      const rename = this.button('rename', `rename ${own}`, () => this.rename(future, go));
+      const rename = button('rename', `rename ${own}`, () => this.rename(future, go));
       forget.className = rename.className = 'small';
       place.append(rename, forget);
     }
@@ -166,40 +171,17 @@ export class Branches {
     return whole;
   }
 
-  /** @param {string} words @param {string} label @param {() => void} does @returns {HTMLButtonElement} */
-  button(words, label, does) {
-    const made = document.createElement('button');
-    made.textContent = words;
-    if (label) made.setAttribute('aria-label', label);
-    made.onclick = does;
-    return made;
-  }
-
   /** Give a branch another name, in its place. @param {{number: number, name: string}} branch @param {HTMLElement} place */
   rename({ number, name }, place) {
-    const field = Object.assign(document.createElement('input'), { value: name, maxLength: 80, className: 'naming' });
-    field.setAttribute('aria-label', 'name of the branch');
     this.naming = number;
-    let open = true;
-    const end = (/** @type {boolean} */ isMeant) => {
-      if (!open) return;
-      open = false;
+    retype(place, name, 'name of the branch', (called) => {
       this.naming = -1;
       this.shown = '';
-      field.replaceWith(place);
-      if (!isMeant || field.value === name) return;
-      const call = (/** @type {string} */ called) => () => this.link.ask('rename', { number, name: called });
-      call(field.value)();
-      this.undo.act({ words: `branch named ${field.value || 'no more'}`, undo: call(name), redo: call(field.value) });
-    };
-    field.onkeydown = (event) => {
-      if (event.key === 'Enter' || event.key === 'Escape') end(event.key === 'Enter');
-      event.stopPropagation();
-    };
-    field.onblur = () => end(true);
-    place.replaceWith(field);
-    field.focus();
-    field.select();
+      if (called === null) return;
+      const call = (/** @type {string} */ one) => () => this.link.ask('rename', { number, name: one });
+      call(called)();
+      this.undo.act({ words: `branch named ${called || 'no more'}`, undo: call(name), redo: call(called) });
+    });
   }
 
   /** Compare with a branch, or with none. @param {number | null} number @param {string} name */

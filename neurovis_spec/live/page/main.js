@@ -161,6 +161,7 @@ const link = new Link({
     turning.use(scene);
     outline.use(scene);
     placing.use(scene);
+    views.use();
     redraw();
   },
   traces(traces) {

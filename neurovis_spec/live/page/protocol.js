@@ -58,7 +58,7 @@ import { isStill } from './camera.js';
 /** What is not finite: the first, since which step, or an earlier one that is not known, and how many are; '' where nothing is.
  * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
 /** Where a page stood; null of what it says nothing. @typedef {{step: number | null, speed: string | null, camera: number[] | null, curves: string[] | null,
- *   theme: string | null, closed: string[] | null}} SavedView */
+ *   theme: string | null, closed: string[] | null, shows: string | null}} SavedView */
 /** @typedef {Status | {type: 'views', file: string, views: Object<string, SavedView>, findings: string} | {type: 'values', step: number, values: Object<string, number | null>}
  *   | {type: 'body', skeleton: Skeleton | null, start: number[], motors: Motor[]}
  *   | {type: 'making', done: number, total: number}

@@ -34,7 +34,7 @@ const SPIKE = 'spike';
 /** What a strip shows that is the raster of a neuron's group: no name. */
 const RASTER = '*';
 
-/** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is, and how pale that of a future that was left; milliseconds between two traces that are asked for, and until one is asked for again. */
+/** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is, and how pale that of a future that was left; how many characters an end of an axis has room for; milliseconds between two traces that are asked for, and until one is asked for again. */
 const PINS = 8;
 /** The most that is drawn at once: what joined curves are besides is left out. */
 const TRACED = 24,
@@ -45,6 +45,7 @@ const TRACED = 24,
   PALE = 0.3,
   FAINT = 0.5,
   WIDE = 4,
+  FITS = 7,
   PACE = 40,
   LOST = 2000;
 
@@ -663,5 +664,6 @@ function rounded(value) {
 
 /** A number in little room. @param {number} value @returns {string} */
 function short(value) {
-  return String(Number(value.toPrecision(3))).replace('-', '−');
+  const [fine, coarse] = [3, 2].map((digits) => String(Number(value.toPrecision(digits))).replace('-', '−'));
+  return fine.length > FITS ? coarse : fine;
 }

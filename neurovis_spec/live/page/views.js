@@ -2,6 +2,7 @@
  * Saved views: where the page stood, by names, in a file beside the spec; gone to with a click.
  */
 
+import { button, retype } from './naming.js';
 import { refOf } from './protocol.js';
 
 /** @typedef {import('./appearance.js').Appearance} Appearance */
@@ -31,6 +32,9 @@ export class Views {
     this.form = /** @type {HTMLFormElement} */ (part('keep'));
     this.list = part('views');
     this.found = part('viewsfound');
+    this.owner = false;
+    /** what is to be seen in the next scene @type {number[] | null} */
+    this.next = null;
     /** by their names; null until they are told @type {Object<string, SavedView> | null} */
     this.all = null;
     this.file = '';
@@ -59,7 +63,10 @@ export class Views {
 
   /** Who may save one. */
   status() {
-    this.form.hidden = !this.all || !this.share.controls.owner;
+    const { owner } = this.share.controls;
+    if (this.all && this.owner !== owner) this.rows();
+    this.owner = owner;
+    this.form.hidden = !this.all || !owner;
   }
 
   /** They are told. @param {{file: string, views: Object<string, SavedView>, findings: string}} message */
@@ -68,23 +75,52 @@ export class Views {
     this.status();
     this.found.textContent = findings;
     this.found.hidden = !findings;
-    this.list.replaceChildren(
-      ...Object.keys(views).map((name) => {
-        const row = document.createElement('li'),
-          go = document.createElement('button');
-        go.textContent = name;
-        go.className = 'go';
-        go.title = `go to the view that was saved in ${file}`;
-        go.onclick = () => this.go(name);
-        row.append(go);
-        return row;
-      }),
-    );
+    this.rows();
     if (this.saving && Object.hasOwn(views, this.saving)) {
       this.undo.tell(`saved ${this.saving} in ${file}`);
       this.saving = '';
     }
     if (this.wanted) this.open(this.wanted);
+  }
+
+  /** List them. */
+  rows() {
+    const rows = Object.entries(this.all ?? {}).map(([name, view]) => {
+      const row = document.createElement('li'),
+        go = button(name, '', () => this.go(name));
+      go.className = 'go';
+      go.title = `go to the view that was saved in ${this.file}`;
+      row.append(go);
+      if (this.share.controls.owner) {
+        const rename = button('rename', `rename ${name}`, () => this.rename(name, go)),
+          forget = button('delete', `delete ${name}`, () => this.forget(name, view));
+        rename.className = forget.className = 'small';
+        row.append(rename, forget);
+      }
+      return row;
+    });
+    this.list.replaceChildren(...rows);
+  }
+
+  /** Have a view be called otherwise, in its place. @param {string} name @param {HTMLElement} place */
+  rename(name, place) {
+    retype(place, name, 'name of the view', (typed) => {
+      const to = (typed ?? '').trim().replaceAll(/\s+/g, ' '),
+        call = (/** @type {string} */ from, /** @type {string} */ called) => () =>
+          this.share.link.ask('rekeep', { name: from, to: called });
+      if (to && to !== name) this.undo.whole({ words: `view named ${to}`, undo: call(to, name), redo: call(name, to) });
+    });
+  }
+
+  /** Take a view out of the file. @param {string} name @param {SavedView} view */
+  forget(name, view) {
+    const { link } = this.share;
+    this.undo.whole({
+      words: `deleted the view ${name}`,
+      undo: () => link.ask('keep', { name, view }),
+      redo: () => link.ask('unkeep', { name }),
+    });
+    this.undo.tell(`deleted the view ${name}`);
   }
 
   /** The page was opened with a view. @param {string} name */
@@ -123,6 +159,7 @@ export class Views {
       }),
       theme: this.appearance.chosen,
       closed: zoom.boxes.filter(({ id }) => zoom.hand.has(id)).map(({ path }) => path),
+      shows: this.asMatrix() ? 'matrix' : this.appearance.shown.pathways ? 'pathways' : 'network',
     };
   }
 
@@ -157,7 +194,7 @@ export class Views {
   }
 
   /** Have a page, and the owner's run, be as a view says. @param {SavedView} view */
-  show({ step, speed, camera, curves, theme, closed }) {
+  show({ step, speed, camera, curves, theme, closed, shows }) {
     const { share, zoom } = this,
       missing = curves ? this.pin(curves) : [];
     if (closed) {
@@ -166,11 +203,22 @@ export class Views {
       zoom.from = '';
     }
     if (theme !== null && theme !== this.appearance.chosen) this.appearance.choose(theme);
-    if (camera && this.asMatrix()) this.share.matrix.click();
-    if (camera) share.see(this.units(camera, true));
+    const { appearance } = this,
+      turns = shows !== null && (shows === 'pathways') !== appearance.shown.pathways && appearance.owner;
+    if (shows === null ? camera && this.asMatrix() : (shows === 'matrix') !== this.asMatrix()) share.matrix.click();
+    if (turns) appearance.toggle();
+    this.next = turns ? camera : null;
+    if (camera && !turns) share.see(this.units(camera, true));
     share.run(step, speed);
     if (missing.length) share.tell(`left out, as there is none here: ${missing.join(', ')}`);
     this.redraw();
+  }
+
+  /** Another scene is there, which a view may have asked for. */
+  use() {
+    const { next } = this;
+    this.next = null;
+    if (next) this.share.see(this.units(next, true));
   }
 
   /** Pin curves and nothing else; what is none any more. What nothing is called may be a measure: the owner's run is asked
