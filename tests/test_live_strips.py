@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from chromium import Page
 from live_window import HEAD
@@ -213,8 +214,9 @@ def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp
             run = compiled.run(last + 1)
             here = min(now, last)
             await opened.until(f"{STEP} == {here}")
-            value = float(str(await opened.ask("document.querySelector('.now').textContent")).replace("−", "-"))
-            assert value == pytest.approx(run["O"][here], rel=1e-5)
+            now_ = "Number(document.querySelector('.now').textContent.replace('−', '-'))"
+            wanted = float(run["O"][here])
+            await opened.until(f"Math.abs({now_} - {wanted}) < {1e-5 * abs(wanted)}")
             buttons = "[...document.querySelectorAll('#others button')]"
             labels = f"{buttons}.map((one) => one.ariaLabel ?? '')"
             await opened.ask("document.querySelector('#current button').click()")
@@ -267,6 +269,7 @@ async def side_by_side(opened: Page, buttons: str) -> None:
     await opened.until(f"{STEP} == 250 && other.ariaLabel.includes('step 250')")
     run, branch = await seen()
     assert run != branch
+    await pointed_at_in(opened)
     await opened.ask(f"{SCRUB}.value = 120; {SCRUB}.dispatchEvent(new Event('input'))")
     await opened.until(f"{STEP} == 120 && other.ariaLabel.includes('step 120')")
     before = await seen()
@@ -280,6 +283,31 @@ async def side_by_side(opened: Page, buttons: str) -> None:
     assert await seen() == [branch, run]
     await opened.ask(f"{buttons}[0].click()")
     await opened.until("!document.body.classList.contains('compared')")
+
+
+#: Move the pointer over the other picture until it is on something whose value is told.
+OVER = """
+(async () => {
+  const { left, top, width, height } = other.getBoundingClientRect();
+  for (let x = left + 5; x < left + width; x += 9) for (let y = top + 5; y < top + height; y += 9) {
+    other.dispatchEvent(new PointerEvent('pointermove', {clientX: x, clientY: y, bubbles: true}));
+    for (let wait = 0; other.style.cursor === 'pointer' && wait < 50; wait++) {
+      await new Promise(requestAnimationFrame);
+      if (!tip.hidden && /(activity|weight) [^,]+, in B [+−0]/.test(tip.textContent)) return tip.textContent;
+    }
+  }
+  return '';
+})()
+"""
+
+
+async def pointed_at_in(opened: Page) -> None:
+    """What is pointed at in the other picture has its tooltip there, with its values in both."""
+    assert await opened.ask(OVER)
+    inside = """(([a, b]) => a.left >= b.left - 1 && a.right <= b.right + 1 && a.top >= b.top - 1)(
+        [tip, other].map((one) => one.getBoundingClientRect()))"""
+    assert await opened.ask(inside)
+    await opened.ask("other.dispatchEvent(new PointerEvent('pointerleave'))")
 
 
 def test_a_branch_goes_on_from_the_step_that_is_shown(tmp_path: Path) -> None:
@@ -541,10 +569,40 @@ def test_a_curve_is_added_by_typing_it_and_those_who_look_on_see_it(tmp_path: Pa
     asyncio.run(main())
 
 
+async def behind_a_plane(opened: Page, step: int, before: list[npt.NDArray[np.float64]], ink: str) -> None:
+    """How a plane went in the branch that is left lies pale in it, in an axis that has room for both."""
+    await opened.ask(f"{SCRUB}.value = 60; {SCRUB}.dispatchEvent(new Event('input'))")
+    await opened.until(f"{STEP} == 60")
+    await opened.key("t")
+    await opened.ask("document.querySelector('#picture').focus()")
+    await opened.key("]")
+    await opened.ask("document.querySelector('#lesion').click()")
+    await opened.until("document.querySelector('#others').children.length == 1")
+    await opened.key(" ")
+    await opened.until(f"{STEP} > 120 && {TRACE.format(1)}?.includes('behind it how it went before')")
+    last = min(step, await pause(opened))
+    await opened.key("t")
+    canvas = "document.querySelector('.plane')"
+    await opened.until(f"{canvas}.width == {canvas}.clientWidth * devicePixelRatio")
+    label = str(await opened.ask(TRACE.format(1))).replace("−", "-")
+    found = re.search(r"between (\S+) and (\S+), C1 between (\S+) and (\S+),", label)
+    assert found
+    bottom, top, left, right = (float(one) for one in found.groups())
+    height = (await numbers(opened, "document.querySelector('.plane').height"))[0]
+    sides = [
+        (of[61 : last + 1] - low) / (high - low)
+        for of, (low, high) in zip(before, ((left, right), (bottom, top)), strict=True)
+    ]
+    pairs = zip(*(side.tolist() for side in sides), strict=True)
+    points = [[8 + (2 * height - 16) * x, height - 8 - (height - 16) * y] for x, y in pairs][::7]
+    assert await opened.ask(ink.replace("> 60", "> 15").format([points])) == [len(points)]
+
+
 def test_two_signals_share_an_axis_or_span_a_plane_and_part_again(tmp_path: Path) -> None:
     """What is drawn in the plane are the values of the steps, each against that of the same step."""
     ink = (  # of several lists of points, how many of each have some
-        "((c, lists, pixels = c.getContext('2d').getImageData(0, 0, c.width, c.height).data, "
+        "((c, lists, copy = new OffscreenCanvas(c.width, c.height).getContext('2d'), "
+        "pixels = (copy.drawImage(c, 0, 0), copy.getImageData(0, 0, c.width, c.height).data), "
         "there = (x, y) => pixels[4 * (Math.round(y) * c.width + Math.round(x)) + 3] > 60) => lists.map((points) => "
         "points.filter(([x, y]) => [-1, 0, 1].some((dx) => [-1, 0, 1].some((dy) => there(x + dx, y + dy)))).length))"
         "(document.querySelector('.plane'), {0})"
@@ -586,8 +644,9 @@ def test_two_signals_share_an_axis_or_span_a_plane_and_part_again(tmp_path: Path
             await opened.until(f"{TRACE.format(1)}?.startsWith('O from step 0 to {step}')")
             await opened.ask("document.querySelector('#redo').click()")
             await opened.until(f"{TRACE.format(1)}?.startsWith('O against C1 from step 0 to {step}')")
+            await behind_a_plane(opened, step, [run["C1"], run["O"]], ink)
             await opened.ask(JOIN.format(1, "over time"))
-            await opened.until(f"{TRACE.format(1)}?.startsWith('O from step 0 to {step}')")
+            await opened.until(f"{TRACE.format(1)}?.startsWith('O from step 0 to')")
             await opened.ask("document.querySelector('#picture').focus()")
             await opened.key("f")
             await opened.until("document.documentElement.classList.contains('presenting')")

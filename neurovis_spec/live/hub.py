@@ -33,6 +33,7 @@ from neurovis_spec.live.joined import Joined, joined
 from neurovis_spec.live.protocol import (
     ADDED,
     LEFT,
+    LEFT_PAIRS,
     PAIRS,
     TRACE,
     Close,
@@ -233,10 +234,10 @@ class Hub:
         if client in self._clients and shown is not None and wanted is not None:
             read = partial(self._traces, shown.view)
             left = shown.status.futures.history(wanted.branch)
+            both = (() if left is None else ((left, LEFT, LEFT_PAIRS),)) + ((shown.history, TRACE, PAIRS),)
             client.traces = (
-                *(() if left is None else (read(left, wanted.items, wanted.bins, LEFT),)),
-                read(shown.history, wanted.items, wanted.bins, TRACE),
-                *((read(shown.history, wanted.pairs, wanted.steps, PAIRS),) if wanted.pairs else ()),
+                *(read(history, wanted.items, wanted.bins, kind) for history, kind, _ in both),
+                *(read(history, wanted.pairs, wanted.steps, kind) for history, _, kind in both if wanted.pairs),
                 *(self._raster(shown, item, wanted.bins) for item in wanted.rasters),
             )
             client.wake.set()
@@ -355,7 +356,8 @@ class Hub:
             yield from self._aside(client, shown)
         if client.asked:
             client.asked = False
-            yield values_message(shown.glance.step, _values(shown, client.items))
+            beside = {} if shown.compared is None else shown.view.values(shown.compared.seen, client.items)
+            yield values_message(shown.glance.step, _values(shown, client.items), beside)
         if client.traces:
             traces, client.traces = client.traces, ()
             yield from traces

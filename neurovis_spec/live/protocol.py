@@ -76,7 +76,7 @@ from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
-SCENE, FRAME, TRACE, FILE, RASTER, LEFT, HELD, SUMS, JOINED, ADDED, PAIRS, ASIDE = range(1, 13)
+SCENE, FRAME, TRACE, FILE, RASTER, LEFT, HELD, SUMS, JOINED, ADDED, PAIRS, ASIDE, LEFT_PAIRS = range(1, 14)
 #: kind, scene
 _SCENE_HEAD = struct.Struct("<BxH")
 #: kind
@@ -240,16 +240,19 @@ def _message(turn: Turn) -> dict[str, object]:
     return {"type": type(turn).__name__.lower(), **asdict(turn)}
 
 
-def values_message(step: int, values: Mapping[str, float]) -> str:
-    """Exact values of what a client looks at; null for what is no finite number."""
-    known = {name: value if math.isfinite(value) else None for name, value in values.items()}
-    return _text("values", step=step, values=known)
+def values_message(step: int, values: Mapping[str, float], other: Mapping[str, float]) -> str:
+    """Exact values of what a client looks at, and those of the branch beside the run; null for what is no finite
+    number."""
+    known, beside = (
+        {name: value if math.isfinite(value) else None for name, value in some.items()} for some in (values, other)
+    )
+    return _text("values", step=step, values=known, other=beside)
 
 
 def trace_message(version: int, traces: Mapping[tuple[int, int], Range], bins: Bins, kind: int = TRACE) -> bytes:
     """Traces of items (``View.place``), each with what of it that is: 0 its activity or weight, else the
     number of a name in the list that the scene has for it, from 1 on. The least and the largest value of each bin. Of
-    the ``kind`` LEFT they are those of another future; of PAIRS a bin is a step."""
+    the ``kind`` LEFT they are those of another future; of PAIRS, and LEFT_PAIRS, a bin is a step."""
     head = _TRACE_HEAD.pack(kind, version, len(traces), bins.first, bins.every, bins.count)
     items = np.array(list(traces), "<u4").reshape(-1, 2).T
     return b"".join([head, items.tobytes(), *(trace.astype("<f4").tobytes() for trace in traces.values())])

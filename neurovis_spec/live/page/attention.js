@@ -6,6 +6,7 @@ import { Bands } from './bands.js';
 import { isBeside } from './beside.js';
 import { halfway } from './marks.js';
 import { say } from './say.js';
+import { Sized } from './sized.js';
 
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {import('./zoom.js').Zoom} Zoom */
@@ -81,6 +82,12 @@ export class Attention {
     this.near = new Set();
     /** @type {Object<string, number | null>} */
     this.values = {};
+    /** those of the branch beside the run @type {Object<string, number | null>} */
+    this.other = {};
+    /** where the picture of the run stands; and that which is pointed at, where it is another */
+    this.stands = new Sized(/** @type {HTMLElement} */ (document.getElementById('picture')), changed);
+    /** @type {Sized | null} */
+    this.over = null;
     /** where the pointer is, in units @type {number[]} */
     this.place = [0, 0];
     /** on which side of its place the tooltip is, and for what that was found */
@@ -122,9 +129,9 @@ export class Attention {
     return this.groups.has(id) || (/^c\d+$/.test(id) && scene !== null && Number(id.slice(1)) < scene.lines);
   }
 
-  /** @param {string} id @param {number[]} place */
-  point(id, place) {
-    this.place = place;
+  /** @param {string} id @param {number[]} place @param {Sized | null} [over] another picture of the same */
+  point(id, place, over = null) {
+    [this.place, this.over] = [place, over];
     if (id !== this.pointed) {
       this.pointed = id;
       this.ask();
@@ -207,9 +214,9 @@ export class Attention {
     return [id, ...joined, ...[...lines, ...dotted, ...discs].map((group) => (group ? group.id : ''))];
   }
 
-  /** @param {{values: Object<string, number | null>}} message */
+  /** @param {{values: Object<string, number | null>, other: Object<string, number | null>}} message */
   take(message) {
-    this.values = message.values;
+    [this.values, this.other] = [message.values, message.other];
     this.speak();
     this.changed();
   }
@@ -258,7 +265,8 @@ export class Attention {
     const [name, ...more] = group.title.split('\n'),
       { neuron, delay, state } = group.data;
     const what = neuron === undefined ? 'weight' : (state ?? 'activity'),
-      told = id in this.values ? [`${what} ${signed(this.values[id])}`] : [];
+      beside = id in this.other ? `, in B ${signed(this.other[id])}` : '',
+      told = id in this.values ? [`${what} ${signed(this.values[id])}${beside}`] : [];
     if (delay !== undefined && !more.some((line) => line.startsWith('delay '))) told.push(`delay ${delay}`);
     const item = Number(id.slice(1)) + (neuron === undefined ? 0 : look.widths.length);
     const { isClamped = 0, isFaint = 0 } = this.link.scene?.constants ?? {},
@@ -334,6 +342,7 @@ export class Attention {
     const [across, down] = this.side.map((way, axis) =>
       Math.max(0, Math.min(at[axis] + (way < 0 ? -GAP - size[axis] : GAP), edge[axis] - size[axis])),
     );
-    tip.style.transform = `translate(${Math.round(across)}px, ${Math.round(down)}px)`;
+    const { left, top } = (this.pointed && this.over) || this.stands;
+    tip.style.transform = `translate(${Math.round(left + across)}px, ${Math.round(top + down)}px)`;
   }
 }

@@ -13,7 +13,8 @@ import { signed } from './attention.js';
 export const COLOURS = ['#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#8a6fd1'];
 /** Room around a plane, and the radius of the point of now, in pixels of a page. */
 const MARGIN = 8,
-  POINT = 4;
+  POINT = 4,
+  PALE = 0.3;
 
 /** What a strip shows, to be shown by another. @param {Strip} strip @returns {Joined} */
 export function taken({ id, what, key, names, data }) {
@@ -52,23 +53,28 @@ export function again(joined, groups) {
   });
 }
 
-/** The least and the largest finite number. @param {Float32Array} values @returns {[number, number]} */
-function range(values) {
+/** The least and the largest finite number. @param {ArrayLike<number> & Iterable<number>} values
+ * @param {ArrayLike<number> & Iterable<number>} more @returns {[number, number]} */
+function range(values, more) {
   let [low, high] = [Infinity, -Infinity];
-  for (const value of values) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
+  for (const some of [values, more])
+    for (const value of some) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
   return [low, high];
 }
 
-/** Draw one signal against another, over time, and where they are now.
- * @param {Strip} strip @param {Traces} pairs the value of each at each step, twice @param {Object<string, number | null>} values those of now */
-export function plane(strip, { first, ranges }, values) {
+/** Draw one signal against another, over time, and where they are now; pale how they went in another branch.
+ * @param {Strip} strip @param {Traces} pairs the value of each at each step, twice @param {Object<string, number | null>} values those of now
+ * @param {Traces | null} beyond those of the branch @param {string} called what that is called */
+export function plane(strip, { first, ranges }, values, beyond, called) {
   const { canvas, against } = strip,
-    [across, up] = [against?.key ?? '', strip.key].map((key) => ranges.get(key));
+    keys = [against?.key ?? '', strip.key],
+    [across, up] = keys.map((key) => ranges.get(key)),
+    [otherAcross, otherUp] = keys.map((key) => beyond?.ranges.get(key));
   if (!against || !across || !up) return;
   const { clientWidth: width, clientHeight: height } = canvas,
     context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d')),
     style = getComputedStyle(canvas),
-    [[left, right], [bottom, top]] = [range(across), range(up)];
+    [[left, right], [bottom, top]] = [range(across, otherAcross ?? []), range(up, otherUp ?? [])];
   [canvas.width, canvas.height] = [width * devicePixelRatio, height * devicePixelRatio];
   context.scale(devicePixelRatio, devicePixelRatio);
   const known = left <= right && bottom <= top,
@@ -79,21 +85,27 @@ export function plane(strip, { first, ranges }, values) {
   const x = (value) => MARGIN + (wide - 2 * MARGIN) * share(value, left, right);
   /** @param {number} value */
   const y = (value) => height - MARGIN - (height - 2 * MARGIN) * share(value, bottom, top);
+  /** @param {Float32Array} one @param {Float32Array} other @param {number} alpha @returns {boolean} whether any of it is known */
+  const path = (one, other, alpha) => {
+    context.globalAlpha = alpha;
+    context.beginPath();
+    let [pen, any] = [false, false];
+    for (let at = 0; at < other.length; at += 2) {
+      const there = Number.isFinite(one[at]) && Number.isFinite(other[at]);
+      if (there) context[pen ? 'lineTo' : 'moveTo'](x(one[at]), y(other[at]));
+      [pen, any] = [there, any || there];
+    }
+    context.stroke();
+    context.globalAlpha = 1;
+    return any;
+  };
   context.strokeStyle = style.borderTopColor;
   context.strokeRect(0.5, 0.5, wide - 1, height - 1);
   context.strokeStyle = context.fillStyle = style.color;
   context.lineWidth = 1.2;
   context.lineJoin = 'round';
-  context.globalAlpha = 0.6;
-  context.beginPath();
-  let pen = false;
-  for (let at = 0; at < up.length; at += 2) {
-    const there = Number.isFinite(across[at]) && Number.isFinite(up[at]);
-    if (there) context[pen ? 'lineTo' : 'moveTo'](x(across[at]), y(up[at]));
-    pen = there;
-  }
-  context.stroke();
-  context.globalAlpha = 1;
+  const went = otherAcross && otherUp && path(otherAcross, otherUp, PALE);
+  path(across, up, 0.6);
   const now = [against.key, strip.key].map((key) => values[key]);
   if (known && typeof now[0] === 'number' && typeof now[1] === 'number') {
     context.fillStyle = COLOURS[1];
@@ -112,7 +124,7 @@ export function plane(strip, { first, ranges }, values) {
   canvas.setAttribute(
     'aria-label',
     known
-      ? `${strip.told} from step ${first} to ${first + up.length / 2 - 1}: between ${signed(bottom)} and ${signed(top)}, ${against.name} between ${signed(left)} and ${signed(right)}`
+      ? `${strip.told} from step ${first} to ${first + up.length / 2 - 1}: between ${signed(bottom)} and ${signed(top)}, ${against.name} between ${signed(left)} and ${signed(right)}${went ? `, behind it ${called || 'how it went before'}` : ''}`
       : `${strip.told}: nothing is known of these steps`,
   );
 }

@@ -32,6 +32,7 @@ import { Saves } from './saves.js';
 import { say } from './say.js';
 import { Scrubber } from './scrubber.js';
 import { Share } from './share.js';
+import { Sized } from './sized.js';
 import { Strips } from './strips.js';
 import { told } from './told.js';
 import { Turning } from './turning.js';
@@ -172,6 +173,9 @@ const link = new Link({
   },
   pairs(traces) {
     strips.pairs(traces);
+  },
+  leftPairs(traces) {
+    strips.leftPaired = traces;
   },
   raster(raster) {
     strips.raster(raster);
@@ -348,22 +352,35 @@ const placing = new Placing(
   },
   part,
 );
+/** What lies under a pixel of a picture, or of its matrix. @param {Picture} shown @param {Matrix | null} cells
+ * @param {number} x @param {number} y @returns {string} */
+function pointed({ drawing }, cells, x, y) {
+  if (cells) return cells.under(camera, x, y);
+  const at = camera.unit(x, y);
+  return (
+    zoom.under(at) || (drawing ? under(drawing, camera, x, y) || zoom.titled(at, context, drawing.family.join()) : '')
+  );
+}
+
+/** A click on something. @param {string} id */
+function pressed(id) {
+  if (zoom.boxes.some((box) => box.id === id)) turn(id);
+  else if (!id.startsWith('joined:')) attention.hold(id);
+}
+
 const pointer = new Pointer(canvas, camera, attention, placing, {
-  pointed(x, y) {
-    if (matrix) return matrix.under(camera, x, y);
-    const at = camera.unit(x, y),
-      { drawing } = picture;
-    return (
-      zoom.under(at) || (drawing ? under(drawing, camera, x, y) || zoom.titled(at, context, drawing.family.join()) : '')
-    );
-  },
-  pressed(id) {
-    if (zoom.boxes.some((box) => box.id === id)) turn(id);
-    else if (!id.startsWith('joined:')) attention.hold(id);
-  },
+  pointed: (x, y) => pointed(picture, matrix, x, y),
+  pressed,
   redraw,
 });
 followFingers(canvas, camera, redraw, () => pointer.cancel());
+const beyond = new Pointer(aside.canvas, camera, attention, null, {
+  pointed: (x, y) => pointed(aside.picture, matrix && aside.matrix, x, y),
+  pressed,
+  redraw,
+  over: new Sized(aside.canvas, redraw),
+});
+followFingers(aside.canvas, camera, redraw, () => beyond.cancel());
 /** Come closer to the middle, or go away. @param {number} factor */
 function nearer(factor) {
   camera.closer(factor, camera.window[0] / 2, camera.window[1] / 2);

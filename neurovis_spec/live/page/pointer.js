@@ -6,9 +6,10 @@
 /** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {import('./place.js').Placing} Placing */
-/** What a pointer must know of the page: the id of what lies under a pixel, and how to draw anew.
- * what a click on it does
- * @typedef {{pointed: (x: number, y: number) => string, pressed: (id: string) => void, redraw: () => void}} Ground */
+/** @typedef {import('./sized.js').Sized} Sized */
+/** What a pointer must know of the page: the id of what lies under a pixel, what a click on it does, and how to draw anew;
+ * where the picture stands, if it is not that of the run.
+ * @typedef {{pointed: (x: number, y: number) => string, pressed: (id: string) => void, redraw: () => void, over?: Sized}} Ground */
 
 /** How far a pointer may move, in pixels of a page, before a click is a drag. */
 const STILL = 5;
@@ -21,8 +22,8 @@ const pixel = (event) => [event.offsetX * devicePixelRatio, event.offsetY * devi
 
 /** Follows the pointer over the picture. */
 export class Pointer {
-  /** @param {HTMLCanvasElement} canvas @param {Camera} camera @param {Attention} attention @param {Placing} placing
-   * @param {Ground} ground */
+  /** @param {HTMLCanvasElement} canvas @param {Camera} camera @param {Attention} attention
+   * @param {Placing | null} placing where neurons can be dragged @param {Ground} ground */
   constructor(canvas, camera, attention, placing, ground) {
     this.canvas = canvas;
     this.camera = camera;
@@ -61,11 +62,9 @@ export class Pointer {
       asks = event.shiftKey ? 'hold' : 'place';
     this.cancel();
     this.dragged = 0;
-    this.on =
-      event.button === 0 && placing.can(id, asks) && (event.pointerType === 'mouse' || id === this.attention.held)
-        ? id
-        : '';
-    if (!this.on) return;
+    const isMeant = event.button === 0 && (event.pointerType === 'mouse' || id === this.attention.held);
+    if (!placing || !isMeant || !placing.can(id, asks)) return;
+    this.on = id;
     this.canvas.setPointerCapture(event.pointerId);
     // of one that shows a state the activity is not known
     const from = placing.groups.get(id)?.data.state === undefined ? (this.attention.values[id] ?? 0) : 0;
@@ -77,7 +76,7 @@ export class Pointer {
 
   /** Give up a drag: the neuron stands where it stood. */
   cancel() {
-    if (this.placing.dragged) this.placing.cancel();
+    if (this.placing?.dragged) this.placing.cancel();
     this.on = '';
     this.clamp = null;
   }
@@ -87,7 +86,7 @@ export class Pointer {
     const [x, y] = pixel(event);
     if (this.dragged < STILL && event.button === 0) this.ground.pressed(this.ground.pointed(x, y));
     if (this.clamp && this.dragged >= STILL) this.hold(event, false);
-    this.placing.drop();
+    this.placing?.drop();
     this.on = '';
     this.clamp = null;
   }
@@ -95,7 +94,7 @@ export class Pointer {
   /** Clamp the neuron to what its disc was dragged to. @param {PointerEvent} event @param {boolean} moving */
   hold(event, moving) {
     const { clamp, placing } = this;
-    if (!clamp || (moving && event.timeStamp - clamp.last < OFTEN)) return;
+    if (!placing || !clamp || (moving && event.timeStamp - clamp.last < OFTEN)) return;
     clamp.last = event.timeStamp;
     const value = Number((clamp.from + (clamp.y - event.offsetY) / ONE).toFixed(2));
     placing.link.ask('hold', { neurons: placing.groups.get(this.on)?.data.neuron, value, moving });
@@ -108,7 +107,7 @@ export class Pointer {
     if (event.buttons !== 1) {
       const id = this.ground.pointed(x, y);
       this.canvas.style.cursor = id ? 'pointer' : '';
-      this.attention.point(id, at);
+      this.attention.point(id, at, this.ground.over);
       return;
     }
     this.dragged += Math.abs(event.movementX) + Math.abs(event.movementY);
@@ -118,7 +117,7 @@ export class Pointer {
     } else if (this.clamp) {
       this.hold(event, true);
     } else if (this.dragged >= STILL) {
-      this.placing.drag(this.on, [at[0] + this.off[0], at[1] + this.off[1]]);
+      this.placing?.drag(this.on, [at[0] + this.off[0], at[1] + this.off[1]]);
     }
   }
 }

@@ -59,7 +59,7 @@ import { isStill } from './camera.js';
  * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
 /** Where a page stood; null of what it says nothing. @typedef {{step: number | null, speed: string | null, camera: number[] | null, curves: string[] | null,
  *   theme: string | null, closed: string[] | null, shows: string | null}} SavedView */
-/** @typedef {Status | {type: 'views', file: string, views: Object<string, SavedView>, findings: string} | {type: 'values', step: number, values: Object<string, number | null>}
+/** @typedef {Status | {type: 'views', file: string, views: Object<string, SavedView>, findings: string} | {type: 'values', step: number, values: Object<string, number | null>, other: Object<string, number | null>}
  *   | {type: 'body', skeleton: Skeleton | null, start: number[], motors: Motor[]}
  *   | {type: 'making', done: number, total: number}
  *   | {type: 'findings', text: string, errors: boolean}
@@ -70,7 +70,7 @@ import { isStill } from './camera.js';
  *   | {type: 'measured', text: string, findings: {start: number, end: number, message: string, hint: string}[]}
  *   | {type: 'refused', reason: string}} Message */
 /** @typedef {{scene: (scene: Scene) => void, frame: () => void, aside: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
- *   left: (traces: Traces) => void, pairs: (traces: Traces) => void,
+ *   left: (traces: Traces) => void, pairs: (traces: Traces) => void, leftPairs: (traces: Traces) => void,
  *   raster: (raster: Raster) => void, held: (told: Told) => void, joined: (joined: Joined) => void,
  *   text: (message: Message) => void, link: (open: boolean) => void}} Listener */
 
@@ -86,6 +86,7 @@ const SCENE = 1,
   KIND = 28,
   SUMS = 8,
   PAIRS = 11,
+  LEFT_PAIRS = 13,
   JOINED = 9,
   ADDED = 10,
   ASIDE = 12,
@@ -323,6 +324,8 @@ export class Link {
       this.listener.left(unpackTraces(data, this.scene));
     } else if (kind === PAIRS && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.pairs(unpackTraces(data, this.scene));
+    } else if (kind === LEFT_PAIRS && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
+      this.listener.leftPairs(unpackTraces(data, this.scene));
     } else if (kind === RASTER && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.raster(unpackRaster(data, this.scene));
     } else if (

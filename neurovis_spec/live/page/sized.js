@@ -8,10 +8,12 @@ export class Sized {
   /** @param {HTMLElement} element @param {() => void} changed */
   constructor(element, changed) {
     this.left = 0;
+    this.top = 0;
     this.wide = 0;
     this.high = 0;
     new ResizeObserver(() => {
-      [this.left, this.wide, this.high] = [element.offsetLeft, element.offsetWidth, element.offsetHeight];
+      const { offsetLeft, offsetTop, offsetWidth, offsetHeight } = element;
+      [this.left, this.top, this.wide, this.high] = [offsetLeft, offsetTop, offsetWidth, offsetHeight];
       changed();
     }).observe(element);
   }

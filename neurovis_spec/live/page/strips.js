@@ -87,6 +87,10 @@ export class Strips {
     /** the values of what is drawn in planes, and those of now that are drawn in them @type {Traces | null} */
     this.paired = null;
     this.pointed = attention.values;
+    /** those of the future that was left, as they have come, and as they are drawn @type {Traces | null} */
+    this.leftPaired = null;
+    /** @type {Traces | null} */
+    this.beyond = null;
     /** the branch that all is compared with, null for the one that was left last, and what it is called @type {number | null} */
     this.branch = null;
     this.called = '';
@@ -510,8 +514,9 @@ export class Strips {
 
   /** Values of each step have come, or others are those of now. @param {Traces | null} traces */
   pairs(traces) {
+    if (traces !== this.paired) [this.beyond, this.leftPaired] = [this.leftPaired, null];
     [this.paired, this.pointed] = [traces, this.attention.values];
-    if (traces) for (const strip of this.pinned) plane(strip, traces, this.attention.values);
+    if (traces) for (const strip of this.pinned) plane(strip, traces, this.attention.values, this.beyond, this.called);
   }
 
   /** A raster has come. @param {Raster} raster */
