@@ -281,9 +281,9 @@ def test_it_connects_again_by_itself(tmp_path: Path) -> None:
                 await opened.ask(
                     "const speed = document.querySelector('#speed'); speed.value = 'max'; speed.onchange()"
                 )
-                await opened.until("/^×[0-9.]+ · numpy$/.test(document.querySelector('#rate').textContent)")
+                await opened.until("/^×[0-9.]+ · in NumPy$/.test(document.querySelector('#rate').textContent)")
                 await opened.ask("speed.value = '0.25'; speed.onchange()")
-                await opened.until("document.querySelector('#rate').textContent == 'numpy'")
+                await opened.until("document.querySelector('#rate').textContent == 'in NumPy'")
                 await server.stop()
                 await opened.until("document.querySelector('#told').textContent.startsWith('not connected')")
                 assert await opened.ask("document.querySelector('#lost').checkVisibility()")

@@ -196,3 +196,47 @@ def test_a_recording_waits_for_play_and_ends(tmp_path: Path) -> None:
                 await until(lambda: widget.step == 29)
 
     asyncio.run(main())
+
+
+def test_the_page_in_a_cell_has_what_the_page_has(tmp_path: Path) -> None:
+    """A curve from the start, branches side by side, undo, other views. A link, which needs an address, and saved
+    views, which need a file, are not offered."""
+    trace = "document.querySelector('.trace').getAttribute('aria-label')"
+    press = "document.querySelector('{0}').click()"
+    beside = "[...document.querySelectorAll('#others button')].find((one) => one.textContent == 'A | B')"
+    compared = "document.body.classList.contains('compared')"
+
+    async def main() -> None:
+        widget = nv.compile(ROOT / "specs/cpg_rbf.yaml").live()
+        async with shown(widget, tmp_path) as opened:
+            await until(lambda: widget.step > 60)
+            async with inside(opened):
+                await opened.until(f"{trace}.startsWith('O and T from step 0')")
+                await opened.ask(press.format("#play"))
+                await until(lambda: not widget.playing)
+                await opened.ask("scrub.value = 30; scrub.dispatchEvent(new Event('input'))")
+                await until(lambda: widget.step == 30)
+                await opened.until("!document.querySelector('#branch').disabled")
+                before = widget.alpha
+                await asyncio.to_thread(setattr, widget, "alpha", 1.2)
+                await opened.until("document.querySelectorAll('#others .branch').length == 1")
+                await opened.ask(press.format("#play"))
+                await until(lambda: widget.step > 50)
+                await opened.ask(press.format("#play"))
+                await until(lambda: not widget.playing)
+                await opened.until(f"{trace}.includes('behind it how it went before')")
+                await opened.ask(f"{beside}.click()")
+                await opened.until(f"{compared} && other.width == picture.width")
+                await opened.ask(press.format("#undo"))
+                await opened.until(f"!{compared}")
+                await opened.ask(press.format("#others .go"))
+                await until(lambda: bool(widget.alpha == before))
+                await opened.ask(press.format("#undo"))
+                await until(lambda: bool(widget.alpha == 1.2))
+                for view in ("matrix", "pathways"):
+                    await opened.ask(press.format(f"#{view}"))
+                    await opened.until(f"document.querySelector('#{view}').ariaPressed == 'true'")
+                offered = "['link', 'keep', 'svg', 'film'].filter((id) => !document.getElementById(id).hidden).join()"
+                assert await opened.ask(offered) == "svg,film"
+
+    asyncio.run(main())

@@ -8,6 +8,9 @@
 const OVER = 1000,
   LATE = 0.9;
 
+/** What backends are called. @type {Object<string, string>} */
+const CALLED = { c: 'C', numpy: 'NumPy', reference: 'Python' };
+
 /** Says it in the bar. */
 export class Rate {
   /** @param {HTMLElement} place */
@@ -46,12 +49,11 @@ export class Rate {
   tell() {
     const { reached, asked, place } = this,
       late = reached < LATE * asked;
-    const words = [late && `×${Number(reached.toPrecision(2))}`, this.backend].filter(Boolean).join(' · ');
+    const made = this.backend && `in ${CALLED[this.backend] ?? this.backend}`,
+      words = [late && `×${Number(reached.toPrecision(2))}`, made].filter(Boolean).join(' · ');
     if (place.textContent === words) return;
     place.textContent = words;
     const why = Number.isFinite(asked) ? `as fast as it can, of ×${asked} that is asked for` : 'as fast as it can';
-    place.title = [late && `times real time: ${why}`, this.backend && `steps are made by ${this.backend}`]
-      .filter(Boolean)
-      .join('; ');
+    place.title = [late && `times real time: ${why}`, made && `steps are made ${made}`].filter(Boolean).join('; ');
   }
 }

@@ -52,6 +52,7 @@ export class Share {
     this.matrix = part('matrix');
     const address = part('link'),
       picture = part('clip');
+    address.hidden = location.protocol === 'about:'; // the page in a notebook has none
     address.onclick = () => {
       this.keep();
       this.told(address, async () => navigator.clipboard.writeText(location.href));
