@@ -74,6 +74,13 @@ def test_what_needs_no_crossing_has_none_and_is_near_to_a_picture(text: str) -> 
     assert 1 / 3 <= proportions(layout) <= 3
 
 
+@pytest.mark.parametrize("count", [8, 12, 16, 24, 90])
+def test_frames_come_in_so_many_rows_that_they_fill_a_page(count: int) -> None:
+    for text in (STAR, f"{STAR}layout: {{direction: right}}\n"):
+        _, layout = drawn(text.replace("40", str(count)))
+        assert 1 / 2 <= proportions(layout) <= 2
+
+
 def test_rows_are_read_like_a_page() -> None:
     _, layout = drawn(STAR)
     rows = rows_of(layout, [f"x{i}.a" for i in range(1, 41)])

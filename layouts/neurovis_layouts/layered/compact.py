@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from operator import attrgetter
 from typing import TypeAlias
 
 from neurovis_layouts.layered.drawing import Drawing
 from neurovis_layouts.layered.page_cost import PageCost, sides, stretched
+from neurovis_layouts.layered.tries import cheapest, steps
 from neurovis_spec.layout.model import LayoutProblem
 
 #: The number of the whole, beside those of kinds of instances; and of what is never folded.
@@ -26,14 +28,8 @@ RANKS = -1
 _STRETCHED, _SHORT = (1.25, 2.0), (12.0, 24.0)
 #: What that has to be worth of what it costs as it is.
 _WORTH = (0.95, 0.75)
-#: Each single fold has to be worth this (with 0.97: thirty coupled instances take 40 % more room for 7 % fewer
-#: crossings).
-_EACH = 0.96
-#: So many numbers of bands one after the other are tried in vain.
-_IN_VAIN = 2
-#: So many numbers of bands or rows are tried one by one, further ones in steps of a fifth, up to so many; and what has
-#: more neurons and connections than the last is not folded.
-_ONE_BY_ONE, _STEP, _MOST_FOLDS, _MOST = 8, 5, 40, 3000
+#: What has more neurons and connections than this is not folded.
+_MOST = 3000
 #: Nothing is longer than the page by this if it can be folded, whatever that costs; without instances only what has
 #: more neurons than this, as lines that run back are worth more in a smaller picture.
 _LONGEST, _MANY = 2.5, 200
@@ -121,12 +117,16 @@ def compact(problem: LayoutProblem, drawn: Drawn, folds: Mapping[Fold, range]) -
         every.append(_Tried(cost(drawing.places, drawing.rect()), _long(problem, drawing), shape))
         return every[-1]
 
+    def changed(shape: Shape, fold: Fold, count: int) -> _Tried:
+        other = shape.changed(fold, count)
+        return tried(other, drawn(problem, other))
+
     first = tried(Shape(draft=True), drawing)
     best: list[_Tried] = []
     for rows_first in (False, True):
         found = first
         for fold in sorted(folds, key=lambda fold: ((fold[1] == RANKS) == rows_first, fold)):
-            found = _folded(lambda shape: tried(shape, drawn(problem, shape)), fold, folds[fold], found)
+            found = cheapest(partial(changed, found.shape, fold), steps(folds[fold]), found)
         best.append(found)
     least = min(best, key=attrgetter("cost"))
     cheap = least.cost < _WORTH[free] * first.cost
@@ -134,34 +134,6 @@ def compact(problem: LayoutProblem, drawn: Drawn, folds: Mapping[Fold, range]) -
     if free and chosen.long > _LONGEST and (worth or cheap or len(problem.neurons) > _MANY):
         chosen = min(every, key=lambda one: (max(one.long, _LONGEST), one.cost))
     return replace(chosen.shape, draft=False) if chosen is not first else Shape()
-
-
-def _folded(tried: Callable[[Shape], _Tried], fold: Fold, counts: range, found: _Tried) -> _Tried:
-    """What costs least with any of these numbers of bands or rows of one kind; once more have been no better for some
-    times, even more are not tried."""
-    best, vain, base = found, 0, found.shape
-    for count in _steps(counts):
-        now = tried(base.changed(fold, count))
-        vain += 1
-        if now.cost < _EACH * best.cost:
-            best, vain = now, 0
-        if vain == _IN_VAIN:
-            break
-    return best
-
-
-def _steps(counts: range) -> list[int]:
-    """The numbers that are tried of these.
-
-    >>> _steps(range(2, 20))
-    [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 19]
-    """
-    found = [count for count in counts if count <= _ONE_BY_ONE]
-    count = max(_ONE_BY_ONE + 1, counts.start)
-    while count < min(counts.stop, _MOST_FOLDS + 1):
-        found.append(count)
-        count += max(1, count // _STEP)
-    return found
 
 
 def _long(problem: LayoutProblem, drawing: Drawing) -> float:

@@ -7,9 +7,10 @@ neurons, the waypoints of edges, and which frames inside are reflected.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 
 import networkx as nx
@@ -19,13 +20,15 @@ from neurovis_layouts.label_room import at_ends, covered, sides_of
 from neurovis_layouts.layered.bands import Bands, Wanted, banded
 from neurovis_layouts.layered.box_columns import spined, straightened, tied
 from neurovis_layouts.layered.flips import Reading, reflected
-from neurovis_layouts.layered.folds import Folds, PlacedRanks, folded, interleaved, stacked, with_exits
+from neurovis_layouts.layered.folds import Folding, Folds, PlacedRanks, folding, interleaved, stacked, with_exits
 from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.mirror import mirrored
 from neurovis_layouts.layered.order import Order, crossings, ordered
+from neurovis_layouts.layered.page_cost import PageCost, page_across
 from neurovis_layouts.layered.parts import symmetric
 from neurovis_layouts.layered.place import flattened, placed, reaches, staggered
 from neurovis_layouts.layered.ranks import INSTANT, levelled, ranks_of
+from neurovis_layouts.layered.tries import cheapest
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint
 from neurovis_spec.layout.geometry import Rect, shifted, snap
@@ -119,6 +122,7 @@ class Component:
     part: RankProblem
     #: by unit
     rank: Sequence[int]
+    folding: Folding = field(default_factory=lambda: Folding([], [], half=False))
     folds: Folds = field(default_factory=lambda: Folds([]))
     #: the boxes that are columns
     columns: AbstractSet[int] = frozenset()
@@ -186,10 +190,48 @@ def with_axis(found: Component) -> Component:
     return replace(found, rank=_one_on_axis(found.part, found.rank))
 
 
-def with_folds(found: Component) -> Component:
-    """Frames that are too many for one rank in several rows."""
+def with_frames_in_ranks(found: Component) -> Component:
+    """All units as they come, and which frames can be folded."""
     part = found.part
-    return replace(found, folds=folded(part.problem, part.units, part.bonds, found.rank, part.edges, part.pair))
+    may = folding(part.problem, part.units, part.bonds, found.rank, part.edges, part.pair)
+    return replace(found, folding=may, folds=may.folded([0] * len(may.blocks)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """In how many rows each block of frames stands, and what that costs."""
+
+    cost: float
+    wide: bool
+    rows: Sequence[int]
+
+
+def with_rows(found: Component, drafted: Callable[[Component], Component]) -> Component:
+    """Frames that are wider than a page side by side in so many rows that the page costs least, as ``drafted``."""
+    part, may = found.part, found.folding
+    if not may.blocks:
+        return found
+    problem = part.problem
+    cost = PageCost(problem, [(problem.edges[i].source, problem.edges[i].target) for i in part.edges], directed=True)
+
+    def tried(rows: Sequence[int]) -> _Tried:
+        layout = drafted(replace(found, folds=may.folded(rows))).layout
+        low, high = layout.extent()
+        places = [layout.places.get(m, low) for m in range(len(problem.neurons))]
+        wide = high[0] - low[0] > page_across(problem) * (high[1] - low[1])
+        return _Tried(cost(places, (*low, *high)), wide, rows)
+
+    best = tried([1] * len(may.blocks))
+    if not best.wide:
+        return found
+    for number, block in enumerate(may.blocks):
+        best = cheapest(partial(_in_rows, tried, best.rows, number), block.rows()[1:], best)
+    return replace(found, folds=may.folded(best.rows))
+
+
+def _in_rows(tried: Callable[[Sequence[int]], _Tried], rows: Sequence[int], block: int, count: int) -> _Tried:
+    """One block in so many rows, the others as they are."""
+    return tried([*rows[:block], count, *rows[block + 1 :]])
 
 
 def with_levels(found: Component) -> Component:

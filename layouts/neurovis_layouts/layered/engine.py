@@ -30,7 +30,7 @@ def _always(_: object) -> bool:
 #: A component for which one way of cutting loops is chosen: its ranks, the order in these, and places.
 RANKS: Phases[Component] = (
     (components.with_axis, lambda found: found.part.pair),
-    (components.with_folds, _always),
+    (components.with_frames_in_ranks, _always),
 )
 ORDER: Phases[Component] = (
     (components.with_levels, _always),
@@ -57,11 +57,13 @@ PLACES: Phases[Component] = (
 
 
 def component(part: RankProblem) -> ComponentLayout:
-    """A component in ranks: of all ways of cutting its loops the one that costs least in a draft."""
+    """A component in ranks: of all ways of cutting its loops the one that costs least in a draft, and of all rows in
+    which its frames may stand."""
     found = [_after(RANKS, one) for one in components.ranked(part)]
     if len(found) > 1:
         found = [min(found, key=lambda one: _after(ORDER, one.draft()).cost())]
-    return _after((*ORDER, *PLACES), found[0]).layout
+    rows = components.with_rows(found[0], lambda one: _after((*ORDER, *PLACES), one.draft()))
+    return _after((*ORDER, *PLACES), rows).layout
 
 
 #: A frame on a page that is divided into rows and columns.

@@ -1,9 +1,10 @@
 """Folds: frames that are too many for one rank, in several rows one behind the other.
 
-In: units with their ranks. Out: ranks in which frames that stand side by side without anything between them come in
-rows, where one row would make the picture much wider than high, and for the neurons of each how far along the row the
-connections of its frame run. What is connected to them runs in the gaps between the frames of the other rows, in one
-order from side to side for all rows, so that folding adds no crossing.
+In: units with their ranks. Out: what of them can be folded (Folding), and how that looks in so many rows (Folds): ranks
+in which frames that stand side by side without anything between them come in rows, and for the neurons of each how far
+along the row the connections of its frame run. What is connected to them runs in the gaps between the frames of the
+other rows, in one order from side to side for all rows, so that folding adds no crossing. In how many rows they stand
+is found by what the page costs (``component_layout.with_rows``).
 
 Once all has its place, connections of folded frames, and of staggered ranks, get a waypoint at the edge of the rank,
 straight in front of the neuron, from which they fan out without a bend (``with_exits``); several that leave side by
@@ -14,6 +15,7 @@ need.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
@@ -22,21 +24,13 @@ from itertools import pairwise
 import networkx as nx
 
 from neurovis_layouts.layered.levels import Levels, Segment
-from neurovis_layouts.layered.page_cost import page_across
 from neurovis_layouts.layered.parts import symmetric
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint
 from neurovis_spec.layout.model import LayoutProblem, Point
 
-#: What is wider than a page by this gets room for what fans out, what is wider by the second is folded, and by the last
-#: is how wide rows are to be.
-_WIDE, _TOO_WIDE, _AIM = 1.1, 2.2, 1.15
 #: Fewer frames than this stay in one row.
 _FEWEST = 8
-#: How much wider a rank gets by a connection that runs through it, and a gap between frames by the first one in it.
-_LINE, _FIRST_LINE = 0.25, 0.2
-#: What a row that is not full counts, against proportions that are off.
-_RAGGED = 0.5
 #: How strongly what stands in one column is held together.
 _COLUMN = 400.0
 #: How much less what leads out of the rows pulls than what leads through them.
@@ -64,37 +58,66 @@ class Folds:
 
 @dataclass(frozen=True, slots=True)
 class _Strand:
-    """Frames that are connected with each other, those of their images with them: they stay together. ``wide`` is the
-    room that they take, ``lines`` how many connections come from before and leave behind."""
+    """Frames that are connected with each other, those of their images with them: they stay together. ``lines`` is how
+    many connections come from before and leave behind."""
 
     units: tuple[int, ...]
     first: int
     last: int
-    wide: float
     lines: tuple[int, int]
 
 
-def folded(
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """Strands side by side in the ranks from ``first`` to ``last``."""
+
+    first: int
+    last: int
+    strands: Sequence[_Strand]
+
+    def rows(self) -> list[int]:
+        """In how many rows it can stand: so many that none is empty, and that not too much runs through them."""
+        count = len(self.strands)
+        through = max(sum(strand.lines[side] for strand in self.strands) for side in (0, 1))
+        most = min(count, 1 + _MOST // max(through, 1))
+        return [rows for rows in range(1, most + 1) if -(-count // -(-count // rows)) == rows]
+
+
+@dataclass(frozen=True, slots=True)
+class Folding:
+    """What of ``units`` with these ranks can be folded; ``half`` says that each strand stands on both sides of an
+    axis."""
+
+    units: Sequence[Unit]
+    rank: Sequence[int]
+    half: bool
+    blocks: Sequence[_Block] = ()
+
+    def folded(self, rows: Sequence[int]) -> Folds:
+        """The folds of these blocks into so many rows each; 0 for what stands as it comes."""
+        found = Folds(list(self.rank))
+        for block, count in sorted(zip(self.blocks, rows, strict=True), key=lambda one: -one[0].first):
+            if count:
+                found = _into_rows(found, self.units, block, count, self.half)
+        return _closed(found) if found.ranks else found
+
+
+def folding(
     problem: LayoutProblem,
     units: Sequence[Unit],
     bonds: Sequence[int],
     rank: Sequence[int],
     edges: Sequence[int],
     pair: Mapping[int, int],
-) -> Folds:
-    """The folds of these units, whose ``bonds`` say who is to share a rank."""
+) -> Folding:
+    """What of these units, whose ``bonds`` say who is to share a rank, can be folded."""
     free = _free(problem, units, bonds, pair)
+    none = Folding(units, rank, bool(pair))
     if len(free) < _FEWEST:
-        return Folds(list(rank))
-    sheet = _Sheet(problem, units, rank, free)
-    strands = _strands(problem, units, rank, edges, pair, free, sheet)
-    found = Folds(list(rank))
-    for first, last, block in sorted(_blocks(strands), reverse=True):
-        rows = sheet.rows(first, last, block, 2 if pair else 1)
-        if rows:
-            sheet.fold(first, last, rows)
-            found = _into_rows(found, units, block, first, last, rows, bool(pair))
-    return _closed(found) if found.ranks else found
+        return none
+    blocks = _blocks(_strands(problem, units, rank, edges, pair, free))
+    large = [block for block in blocks if sum(len(strand.units) for strand in block.strands) >= _FEWEST]
+    return replace(none, blocks=large)
 
 
 def _closed(found: Folds) -> Folds:
@@ -122,7 +145,6 @@ def _strands(
     edges: Sequence[int],
     pair: Mapping[int, int],
     free: AbstractSet[int],
-    sheet: _Sheet,
 ) -> list[_Strand]:
     owner = {m: u for u, unit in enumerate(units) for m in unit.members}
     graph: nx.Graph[int] = nx.Graph()
@@ -140,118 +162,49 @@ def _strands(
     def strand(part: AbstractSet[int]) -> _Strand:
         own = tuple(sorted(part, key=lambda u: min(units[u].members)))
         levels = [rank[u] for u in own]
-        wide = max(math.fsum(sheet.wide(u) for u in own if rank[u] == level) for level in levels)
         up, down = (sum(lines[u][side] for u in own) for side in (0, 1))
-        return _Strand(own, min(levels), max(levels), wide, (up, down))
+        return _Strand(own, min(levels), max(levels), (up, down))
 
     found = map(strand, nx.connected_components(graph))
     return sorted(found, key=lambda strand: min(units[strand.units[0]].members))
 
 
-def _blocks(strands: Sequence[_Strand]) -> list[tuple[int, int, list[_Strand]]]:
-    """Strands by the ranks that they share: first, last, strands."""
-    found: list[tuple[int, int, list[_Strand]]] = []
+def _blocks(strands: Sequence[_Strand]) -> list[_Block]:
+    """Strands by the ranks that they share."""
+    found: list[tuple[int, int]] = []
     for first, last in sorted({(strand.first, strand.last) for strand in strands}):
         if found and first <= found[-1][1]:
-            found[-1] = (found[-1][0], max(found[-1][1], last), [])
+            found[-1] = found[-1][0], max(found[-1][1], last)
         else:
-            found.append((first, last, []))
-    return [(first, last, [s for s in strands if first <= s.first <= last]) for first, last, _ in found]
+            found.append((first, last))
+    return [_Block(first, last, [s for s in strands if first <= s.first <= last]) for first, last in found]
 
 
-class _Sheet:
-    """How wide and high the ranks are, about."""
-
-    def __init__(
-        self, problem: LayoutProblem, units: Sequence[Unit], rank: Sequence[int], free: AbstractSet[int]
-    ) -> None:
-        self._spacing, self._gap = max(problem.neuron_spacing, 0.65), max(problem.rank_spacing, 0.75)
-        self._units = units
-        self._page = page_across(problem)
-        count = max(rank, default=-1) + 1
-        self._fixed, self._high = [0.0] * count, [0.0] * count
-        for u, r in enumerate(rank):
-            self._fixed[r] += 0.0 if u in free else self.wide(u)
-            self._high[r] = max(self._high[r], self._high_of(u))
-
-    def wide(self, u: int) -> float:
-        """How wide a unit is, with the gap to the next."""
-        unit = self._units[u]
-        if unit.places is None:
-            return self._spacing * len(unit.members)
-        across = max(abs(x) for x, _ in unit.places) if unit.reach is None else unit.reach[0]
-        return 2 * across + self._spacing
-
-    def _high_of(self, u: int) -> float:
-        unit = self._units[u]
-        along = max((abs(y) for _, y in unit.places or ()), default=0.0) if unit.reach is None else unit.reach[1]
-        return 2 * along + self._gap
-
-    def rows(self, first: int, last: int, block: Sequence[_Strand], sides: int) -> int:
-        """In how many rows these strands stand best, on so many sides; 0 where nothing has to be done about them."""
-        count = len(block)
-        if sum(len(strand.units) for strand in block) < _FEWEST:
-            return 0
-        through = max(sum(strand.lines[side] for strand in block) for side in (0, 1))
-        free = math.fsum(strand.wide for strand in block)
-        beside, most = max(self._fixed[first : last + 1]), max(self._fixed)
-        high, each = math.fsum(self._high), math.fsum(self._high[first : last + 1])
-        if free + beside <= max(_TOO_WIDE * self._page * high, most):
-            return int(free + beside > _WIDE * self._page * high)
-        area = (free + beside) * high
-        best = (math.inf, 1)
-        for rows in range(1, min(count, 1 + _MOST // max(through, 1)) + 1):
-            columns = -(-count // rows)
-            if -(-count // columns) < rows:
-                continue
-            lines = through * (rows - 1) / rows * _LINE + columns * sides * _FIRST_LINE if rows > 1 else 0.0
-            wide, tall = max(free * columns / count + lines + beside, most), high + (rows - 1) * each
-            # rounded, since the last bits of a logarithm are the machine's
-            worse = round(abs(math.log(wide / tall / (_AIM * self._page))) + max(0.0, math.log(wide * tall / area)), 6)
-            best = min(best, (worse + _RAGGED * (rows * columns - count) / columns, rows))
-        return best[1]
-
-    def fold(self, first: int, last: int, rows: int) -> None:
-        """Repeat the ranks ``first`` to ``last`` once for each row that their block is folded into."""
-        here, more = slice(first, last + 1), [0.0] * ((last + 1 - first) * (rows - 1))
-        self._fixed[here] = [*self._fixed[here], *more]
-        self._high[here] = self._high[here] * rows
-
-
-def _into_rows(
-    found: Folds, units: Sequence[Unit], block: Sequence[_Strand], first: int, last: int, rows: int, half: bool
-) -> Folds:
+def _into_rows(found: Folds, units: Sequence[Unit], block: _Block, rows: int, half: bool) -> Folds:
     """One block folded; ``half`` says that each strand stands on both sides of an axis."""
-    deep = last - first + 1
+    deep = block.last - block.first + 1
     more = deep * (rows - 1)
-    inside = {u for strand in block for u in strand.units}
-    rank = list(found.rank)
-    for u, level in enumerate(found.rank):
-        if u not in inside and level >= first:
-            rank[u] += more * (level > last)
+    rank = [level + more * (level > block.last) for level in found.rank]
     slots, columns = dict(found.slots), dict(found.columns)
     line: list[tuple[float, int, int]] = []
-    per = _shared_out(len(block), rows)
-    number = 0
-    for row, count in enumerate(per):
-        for column in range(count):
-            # what comes from rows farther before runs nearer to the middle
-            turn = 1 if half or 2 * column + 1 < count else -1 if 2 * column + 1 > count else (-1) ** row
-            line.append(((column + 0.5) / count, turn * (rows - row), number))
-            beside: dict[int, int] = {}
-            for u in block[number].units:
-                beside[rank[u]] = beside.get(rank[u], -1) + 1
-                columns.update(dict.fromkeys(units[u].members, (column, count, beside[rank[u]])))
-            for u in block[number].units:
-                rank[u] += deep * row
-            number += 1
-    for place, (_, _, strand) in enumerate(sorted(line)):
-        for u in block[strand].units:
-            slots.update(dict.fromkeys(units[u].members, (place + 0.5) / len(block)))
-    moved = {level + more if level > last else level for level in found.ranks}
-    return replace(
-        found, rank=rank, slots=slots, columns=columns, ranks=frozenset(moved | set(range(first, last + more + 1)))
-    )
+    per = _shared_out(len(block.strands), rows)
+    seats = [(row, column, count) for row, count in enumerate(per) for column in range(count)]
+    for number, (strand, (row, column, count)) in enumerate(zip(block.strands, seats, strict=True)):
+        # what comes from rows farther before runs nearer to the middle
+        turn = 1 if half or 2 * column + 1 < count else -1 if 2 * column + 1 > count else (-1) ** row
+        line.append(((column + 0.5) / count, turn * (rows - row), number))
+        beside: Counter[int] = Counter()
+        for u in strand.units:
+            columns.update(dict.fromkeys(units[u].members, (column, count, beside[rank[u]])))
+            beside[rank[u]] += 1
+        for u in strand.units:
+            rank[u] += deep * row
+    for place, (_, _, number) in enumerate(sorted(line)):
+        for u in block.strands[number].units:
+            slots.update(dict.fromkeys(units[u].members, (place + 0.5) / len(block.strands)))
+    moved = {level + more if level > block.last else level for level in found.ranks}
+    own = range(block.first, block.last + more + 1)
+    return replace(found, rank=rank, slots=slots, columns=columns, ranks=frozenset(moved.union(own)))
 
 
 def _shared_out(count: int, rows: int) -> list[int]:

@@ -81,7 +81,7 @@ def _swept(levels: Levels, segments: Segments, start: Order, strict: bool) -> tu
     ]
     place = places(len(levels.nodes), order)
     best = segments.count(place), list(order)
-    for sweep in range(_SWEEPS):
+    for sweep in range(_SWEEPS if best[0] else 0):
         down = sweep % 2 == 0
         for r in range(1, len(order)) if down else range(len(order) - 2, -1, -1):
             means = segments.means(r, down, place, len(order[r]))

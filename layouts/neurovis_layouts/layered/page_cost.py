@@ -1,8 +1,8 @@
 """The cost of a page: how large it is, how far from its proportions, and how hard to follow what runs on it.
 
 In: where neurons stand, and the frame around all. Out: one number, lower is better, by which all ways of putting blocks
-on a page are compared: as they come, in bands and rows (``compact``), facing each other in the cells of a plan
-(``page_plan``). Routes cost most to draw, so that straight lines stand for them.
+on a page are compared: as they come, in bands and rows (``compact``), in rows of frames (``folds``), facing each other
+in the cells of a plan (``page_plan``). Routes cost most to draw, so that straight lines stand for them.
 """
 
 from __future__ import annotations
