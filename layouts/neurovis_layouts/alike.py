@@ -14,7 +14,7 @@ it is, and r.C with that move.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -150,15 +150,18 @@ class Alike:
 
         reach(neuron, STAY, "")
         for one, by in waiting:
-            for module, place in self._around.get(one, ()):
-                if module.template == by:  # all that are drawn like it have been found from where it was
-                    continue
-                for other in self._makes[module.template]:
-                    mate = other.members[place]
-                    move = None if mate in found else self._move(module, other)
-                    if move is not None:
-                        reach(mate, found[one].then(move), module.template)
+            for module, other, mate in self._mates(one, by):
+                move = None if mate in found else self._move(module, other)
+                if move is not None:
+                    reach(mate, found[one].then(move), module.template)
         return list(found.items())
+
+    def _mates(self, neuron: int, by: str) -> Iterator[tuple[LayoutModule, LayoutModule, int]]:
+        """An instance around a neuron, another of its template, and the neuron that has the same place there; none of
+        the template ``by``: all that are drawn like it have been found from where it was."""
+        for module, place in self._around.get(neuron, ()):
+            if module.template != by:
+                yield from ((module, other, other.members[place]) for other in self._makes[module.template])
 
     def _move(self, one: LayoutModule, other: LayoutModule) -> Move | None:
         """What takes one instance to the other, where neurons of both are placed; None where they are not drawn

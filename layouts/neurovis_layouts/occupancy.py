@@ -213,15 +213,15 @@ class Occupancy:
             for anchor in places if rules.off_lines else chain(places, (place for place, _ in beyond)):
                 if self._free(wish.bodies, anchor, rules):
                     return anchor
-        if not beyond:
-            return None
-        # as far out as is needed for the discs of all copies; these may stand on each other wherever they are
-        (x, y), (dx, dy) = beyond[0]
+        return self._outside(wish.bodies, *beyond[0]) if beyond else None
+
+    def _outside(self, bodies: Sequence[Body], place: Point, way: Point) -> Point | None:
+        """As far out from a place as is needed for the discs of all copies; these may stand on each other wherever they
+        are."""
+        (x, y), (dx, dy) = place, way
         x0, y0, x1, y1 = self._bounds or (x, y, x, y)
-        for step in range(2 * math.ceil(x1 - x0 + y1 - y0) + 2):
-            if self._free(wish.bodies, (x + step * dx, y + step * dy), _DISCS):
-                return x + step * dx, y + step * dy
-        return None
+        points = ((x + step * dx, y + step * dy) for step in range(2 * math.ceil(x1 - x0 + y1 - y0) + 2))
+        return next((point for point in points if self._free(bodies, point, _DISCS)), None)
 
     def _beyond(self, wish: Wish) -> Iterator[tuple[Point, Point]]:
         """Places beside everything, on the side of a mirror's axis that is the first body's, and behind everything;

@@ -15,6 +15,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from itertools import filterfalse
 
 from neurovis_layouts.alike import STAY, Alike, Axis, Move, pairs_by_axis, reflection, same, twice_axis
 from neurovis_layouts.axes import axes, shift_of
@@ -294,22 +295,28 @@ class _Settling:
             done.update(i for copy in singles for i in copy.members)
             return singles, before.where[neuron] if neuron in lost else lead
 
-        for known_before, around in ((True, []), (False, sorted(self._around, key=lambda i: (i not in firm, i)))):
-            for neuron in around:
-                if neuron not in done and not done.isdisjoint(self._around[neuron][-1].members):
-                    yield single(neuron)
+        def whole(one: Whole, known_before: bool) -> tuple[tuple[Body, ...], Point | None]:
+            counterparts = list(self._copies(alike, one, axis))
+            lead = next((copy for copy in counterparts if done.issuperset(copy[0])), None)
+            anchor, first = self._first(one, before if known_before else lead, there, held)
+            copies = self._bodies(first, counterparts, done)
+            done.update(i for copy in copies for i in copy.members)
+            return copies, anchor
+
+        everybody = frozenset(range(len(problem.neurons)))
+        for known_before, chosen in ((True, lost), (False, everybody)):
+            if not known_before:
+                yield from map(single, self._lacking(done, firm))
             for one in sorted(self._wholes, key=lambda one: self._alone(one.members[0], placed)):
-                if not done.isdisjoint(one.members) or (known_before and not lost.issuperset(one.members)):
-                    continue
-                counterparts = list(self._copies(alike, one, axis))
-                lead = next((copy for copy in counterparts if done.issuperset(copy[0])), None)
-                anchor, first = self._first(one, before if known_before else lead, there, held)
-                copies = self._bodies(first, counterparts, done)
-                done.update(i for copy in copies for i in copy.members)
-                yield copies, anchor
-            for neuron in range(len(problem.neurons)):
-                if neuron not in done and (neuron in lost or not known_before):
-                    yield single(neuron)
+                if done.isdisjoint(one.members) and chosen.issuperset(one.members):
+                    yield whole(one, known_before)
+            yield from map(single, filterfalse(done.__contains__, sorted(chosen)))
+
+    def _lacking(self, done: AbstractSet[int], firm: AbstractSet[int]) -> Iterator[int]:
+        """What wholes lack of which something is ``done``, as far as that has come by then; what is ``firm`` first."""
+        for neuron in sorted(self._around, key=lambda i: (i not in firm, i)):
+            if neuron not in done and not done.isdisjoint(self._around[neuron][-1].members):
+                yield neuron
 
     def _first(
         self,

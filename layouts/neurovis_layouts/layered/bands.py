@@ -8,7 +8,7 @@ is room for the connections that run back from the end of one to the next.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
@@ -98,13 +98,8 @@ def _ways(
 ) -> dict[int, list[Point]]:
     """The ways of what is cut: down below its band, up in the street beside that, and from above into the next. Lines
     that do not cross where they are cut do not do so there."""
-    first: dict[int, int] = {}
-    found: dict[int, list[Point]] = {}
-    for i, (upper, a, lower, b) in levels.ends.items():
-        if any(levels.nodes[upper].rank <= cut < levels.nodes[lower].rank for cut in bottoms):
-            first[i] = levels.nodes[upper].rank
-            chain = [(upper, a), *((n, 0.0) for n in levels.passages.get(i, ())), (lower, b)]
-            found[i] = [(places[n][0] + a, places[n][1]) for n, a in chain]
+    found = _cut(levels, places, bottoms)
+    first = {i: levels.nodes[levels.ends[i][0]].rank for i in found}
     corners: dict[tuple[int, int], list[Point]] = {}
     for (cut, bottom), street in zip(bottoms.items(), streets, strict=False):
         here: list[tuple[float, float, int]] = []
@@ -122,6 +117,16 @@ def _ways(
         for rank, point in enumerate(line[1:-1], first[i] + 1):
             ways[i] += [point, *corners.get((i, rank), ())]
     return ways
+
+
+def _cut(levels: Levels, places: Sequence[Point], cuts: Collection[int]) -> dict[int, list[Point]]:
+    """Where the edges that are cut behind any of these ranks are, rank by rank."""
+    found: dict[int, list[Point]] = {}
+    for i, (upper, a, lower, b) in levels.ends.items():
+        if any(levels.nodes[upper].rank <= cut < levels.nodes[lower].rank for cut in cuts):
+            chain = [(upper, a), *((n, 0.0) for n in levels.passages.get(i, ())), (lower, b)]
+            found[i] = [(places[n][0] + a, places[n][1]) for n, a in chain]
+    return found
 
 
 def _rank(levels: Levels, places: Sequence[Point], number: int) -> _Rank:

@@ -167,25 +167,29 @@ class Strips:
         for rank, distances in zip(order, gaps, strict=True):
             for (a, b), gap in zip(pairwise(rank), distances, strict=True):
                 self._apart(a, b, gap)
-            line = [-1, *rank, -1]
-            for a, b in pairwise(line):
+            for a, b in pairwise([-1, *rank, -1]):
                 own = self._line.get(nodes[a].box, -1) if a >= 0 else -1
                 other = self._line.get(nodes[b].box, -1) if b >= 0 else -1
-                if own == other:
-                    continue
-                if own >= 0:
-                    self._apart(a, own + 1, _inside(nodes[a]))
-                if other >= 0:
-                    self._apart(other, b, _inside(nodes[b]))
-                if own >= 0 and other >= 0:
-                    self._apart(own + 1, other, _BETWEEN)
-                elif own >= 0 and b >= 0:
-                    self._apart(own + 1, b, _outside(nodes[b]))
-                elif other >= 0 and a >= 0:
-                    self._apart(a, other, _outside(nodes[a]))
+                if own != other:
+                    self._off_lines(nodes, (a, own), (b, other))
         for line_of in self._line.values():
             self._apart(line_of, line_of + 1, 0.0)
         self._sorted = self._topological()
+
+    def _off_lines(self, nodes: Sequence[Node], one: tuple[int, int], other: tuple[int, int]) -> None:
+        """Two neighbours in a rank, −1 for none, of which not both are in one column, off the lines between them; with
+        each comes the line on the left of its column, −1 where it is in none."""
+        (a, own), (b, foreign) = one, other
+        if own >= 0:
+            self._apart(a, own + 1, _inside(nodes[a]))
+        if foreign >= 0:
+            self._apart(foreign, b, _inside(nodes[b]))
+        if own >= 0 and foreign >= 0:
+            self._apart(own + 1, foreign, _BETWEEN)
+        elif own >= 0 and b >= 0:
+            self._apart(own + 1, b, _outside(nodes[b]))
+        elif foreign >= 0 and a >= 0:
+            self._apart(a, foreign, _outside(nodes[a]))
 
     def _apart(self, a: int, b: int, gap: float) -> None:
         self._after[a][b] = max(self._after[a].get(b, 0.0), gap)

@@ -150,36 +150,50 @@ def _axis(
     high, as can be. The least distances between them are those at which nothing comes closer than a street; of ``rows``
     that have no column in common only centres keep off each other."""
     count = max(count, *(span[axis].stop for span in spans))  # what stands below all is in a row behind these
-    ends = {range(i, i + 1): (0.0, 0.0) for i in range(count)}
-    least: dict[tuple[range, range], float] = {}
-
-    def apart(one: range, other: range, far: float) -> None:
-        pairs = [(one, other), (_image(other, count), _image(one, count))] if even else [(one, other)]
-        for pair in pairs:
-            least[pair] = max(least.get(pair, 0.0), far)
-
-    def reaching(span: range, before: float, behind: float) -> None:
-        known = ends.get(span, (0.0, 0.0))
-        ends[span] = max(known[0], before), max(known[1], behind)
-
+    line = _Line(count, even)
     for i in range(count - 1):
-        apart(range(i, i + 1), range(i + 1, i + 2), float(streets[0, 0]))
+        line.apart(range(i, i + 1), range(i + 1, i + 2), float(streets[0, 0]))
     for span, room in zip(spans, rooms, strict=True):
-        own = span[axis]
-        reaching(own, -room.whole[axis], room.whole[axis + 2])
-        if even:
-            reaching(_image(own, count), room.whole[axis + 2], -room.whole[axis])
-        if len(own) > 1:
-            apart(own[:1], own, 0.0)
-            apart(own, own[-1:], 0.0)
+        line.reaching(span[axis], -room.whole[axis], room.whole[axis + 2])
     for (one, other), far in _least(axis, spans, rooms, streets, rows).items():
-        apart(one, other, far)
-    low = _reached({span: before for span, (before, _) in ends.items()}, least)
-    high = _reached(
-        {span: behind for span, (_, behind) in ends.items()}, {(b, a): far for (a, b), far in least.items()}
-    )
-    middle = {span: (low[span] - high[span]) / 2 for span in ends}
-    return {span: (at - middle[_image(span, count)]) / 2 if even else at for span, at in middle.items()}
+        line.apart(one, other, far)
+    return line.middles()
+
+
+class _Line:
+    """Spans of so many rows or columns, how far what stands in each reaches before its middle and behind it, and how
+    far apart two are at least; ``even``: they are their own mirror image."""
+
+    def __init__(self, count: int, even: bool) -> None:
+        self._count, self._even = count, even
+        self._ends = {range(i, i + 1): (0.0, 0.0) for i in range(count)}
+        self._least: dict[tuple[range, range], float] = {}
+
+    def apart(self, one: range, other: range, far: float) -> None:
+        """One span is before another, at least so far."""
+        image = _image(other, self._count), _image(one, self._count)
+        for pair in [(one, other), image] if self._even else [(one, other)]:
+            self._least[pair] = max(self._least.get(pair, 0.0), far)
+
+    def reaching(self, span: range, before: float, behind: float) -> None:
+        """What stands in a span reaches so far."""
+        image = _image(span, self._count), behind, before
+        for own, low, high in [(span, before, behind), image] if self._even else [(span, before, behind)]:
+            known = self._ends.get(own, (0.0, 0.0))
+            self._ends[own] = max(known[0], low), max(known[1], high)
+        if len(span) > 1:
+            self.apart(span[:1], span, 0.0)
+            self.apart(span, span[-1:], 0.0)
+
+    def middles(self) -> dict[range, float]:
+        """Where the middle of each span is."""
+        low = _reached({span: before for span, (before, _) in self._ends.items()}, self._least)
+        back = {(b, a): far for (a, b), far in self._least.items()}
+        high = _reached({span: behind for span, (_, behind) in self._ends.items()}, back)
+        middle = {span: (low[span] - high[span]) / 2 for span in self._ends}
+        if not self._even:
+            return middle
+        return {span: (at - middle[_image(span, self._count)]) / 2 for span, at in middle.items()}
 
 
 def _least(

@@ -63,16 +63,11 @@ def bonded(
     lines = _Lines(len(units))
     for a, b in sorted(pair.items()):
         lines.join(owner[a], owner[b], 0.0)
-    for line in problem.align:
-        for member in line[1:]:
-            if not lines.join(owner[line[0]], owner[member], depth[line[0]] - depth[member]):
-                names = problem.neurons
-                raise LayoutRefusalError(
-                    "align-conflict",
-                    f"'{names[line[0]]}' and '{names[member]}' cannot stand on one line: what they belong to holds "
-                    "them apart",
-                    about=(names[line[0]], names[member]),
-                )
+    for first, member in ((line[0], member) for line in problem.align for member in line[1:]):
+        if not lines.join(owner[first], owner[member], depth[first] - depth[member]):
+            one, other = problem.neurons[first], problem.neurons[member]
+            words = f"'{one}' and '{other}' cannot stand on one line: what they belong to holds them apart"
+            raise LayoutRefusalError("align-conflict", words, about=(one, other))
     flow = _flow(problem, units, owner) if families else nx.DiGraph()
     for family in families:
         mates = [owner[m] for m in family]

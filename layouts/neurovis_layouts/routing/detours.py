@@ -266,10 +266,7 @@ class Detours:
         while waiting:
             _, at = heapq.heappop(waiting)
             if at == 1:
-                line = [at]
-                while line[-1]:
-                    line.append(int(before[line[-1]]))
-                return [corners.place(n) for n in line[::-1]]
+                return [corners.place(n) for n in _line_to(before, at)]
             if done[at]:
                 continue
             done[at] = True
@@ -299,6 +296,14 @@ class Detours:
             for node in to.tolist():
                 heapq.heappush(waiting, (float(best[node] + ahead[node]), node))
         return None
+
+
+def _line_to(before: IntArray, end: int) -> list[int]:
+    """The points on the way to one, from the first on; ``before`` is the one before each."""
+    line = [end]
+    while line[-1]:
+        line.append(int(before[line[-1]]))
+    return line[::-1]
 
 
 def _closed(walls: Walls) -> FloatArray:

@@ -72,18 +72,8 @@ def loops(
     for i, edge in enumerate(edges):
         if edge.source == edge.target:
             looping.setdefault(edge.source, []).append(i)
-    tangents: dict[int, list[Point]] = {own: [] for own in looping}
-    for i, route in sorted(routes.items()):
-        if edges[i].source in tangents:
-            tangents[edges[i].source].append(_unit(route[0], route[1]))
-        if edges[i].target in tangents:
-            tangents[edges[i].target].append(_unit(route[-1], route[-2]))
-    near: dict[int, list[Point]] = {own: [] for own in tangents}
-    places, owns = np.array(centres, dtype=np.float64).reshape(-1, 2), np.array(list(tangents), dtype=np.int64)
-    number, other, _ = Cells(places, _NEAR).near(places[owns])
-    for own, neighbour in zip(owns[number].tolist(), other.tolist(), strict=True):
-        if neighbour != own:
-            near[own].append(centres[neighbour])
+    tangents = _tangents(edges, routes, list(looping))
+    near = _neighbours(centres, list(looping))
     result: dict[int, Route] = {}
     for own, mine in looping.items():
         result.update({i: there[i] for i in mine if i in there})
@@ -91,6 +81,30 @@ def loops(
         made = _beside(own, centres[own], near[own], tangents[own], barriers, old, len(new))
         result.update(zip(new, made, strict=True))
     return result
+
+
+def _tangents(
+    edges: Sequence[LayoutEdge], routes: Mapping[int, Route], neurons: Sequence[int]
+) -> dict[int, list[Point]]:
+    """The ways, unit vectors, in which routes leave these neurons and arrive at them."""
+    found: dict[int, list[Point]] = {own: [] for own in neurons}
+    for i, route in sorted(routes.items()):
+        if edges[i].source in found:
+            found[edges[i].source].append(_unit(route[0], route[1]))
+        if edges[i].target in found:
+            found[edges[i].target].append(_unit(route[-1], route[-2]))
+    return found
+
+
+def _neighbours(centres: Sequence[Point], neurons: Sequence[int]) -> dict[int, list[Point]]:
+    """The centres of others near these neurons."""
+    found: dict[int, list[Point]] = {own: [] for own in neurons}
+    places, owns = np.array(centres, dtype=np.float64).reshape(-1, 2), np.array(neurons, dtype=np.int64)
+    number, other, _ = Cells(places, _NEAR).near(places[owns])
+    for own, neighbour in zip(owns[number].tolist(), other.tolist(), strict=True):
+        if neighbour != own:
+            found[own].append(centres[neighbour])
+    return found
 
 
 def _unit(origin: Point, towards: Point) -> Point:
