@@ -28,6 +28,8 @@ Side = Literal["right", "left", "below", "above"]
 SIDES: tuple[Side, ...] = get_args(Side)
 #: Width by height of a page: that of a screen or a slide.
 PAGE = 4 / 3
+#: A page that takes less than this share with signals from left to right has them so, if it may choose.
+TURNED = 0.85
 #: Pixels that a picture without a stated size has for the network, beside its margins, title and legend.
 ROOM = (1228.0, 720.0)
 #: How long an engine may look for fewer crossings.

@@ -37,7 +37,7 @@ from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.collapse import Gathered, gathered
 from neurovis_spec.scene.encode import looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.gathered_layout import laid_out
+from neurovis_spec.scene.gathered_layout import standing
 from neurovis_spec.scene.matrix import order_of
 from neurovis_spec.scene.pathway_words import told
 from neurovis_spec.scene.pathways import Pathway
@@ -268,9 +268,8 @@ def view_of(
     layout = compiled.placed(engine) if layout is None else layout
     network = in_direction(compiled.network, layout)
     settings = replace(compiled.settings_for(theme), pathways=appearance.pathways)
-    drawn = gathered(network, settings.collapse, settings.pathways)
+    drawn, stands = standing(network, layout, settings)
     seen = appearance.gains(gains)
-    stands = laid_out(drawn, layout)
     same = before is not None and before.layout is stands and before.appearance == appearance
     planned = retitled(before.plan, drawn, stands, seen, settings) if before is not None and same else None
     planned = planned or plan(drawn, stands, seen, settings)
@@ -340,7 +339,7 @@ def _bundles(planned: Plan) -> tuple[list[Pathway], dict[str, object]]:
 def _planned(
     stands: Layout, gains: Gains, settings: RenderSettings, network: Network, narrowest: float
 ) -> tuple[Gathered, Plan]:
-    drawn = gathered(network, settings.collapse, settings.pathways)
+    drawn = gathered(in_direction(network, stands), settings.collapse, settings.pathways)
     return drawn, plan(drawn, stands, gains, settings, narrowest=narrowest)
 
 

@@ -17,12 +17,11 @@ import numpy.typing as npt
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
-from neurovis_spec.layout.problem import in_direction
 from neurovis_spec.scene.caption import caption
-from neurovis_spec.scene.collapse import Gathered, gathered
+from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.encode import CAPTION, Looks, lesions_by_id, looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.gathered_layout import laid_out
+from neurovis_spec.scene.gathered_layout import standing
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import (
     Arrowhead,
@@ -80,8 +79,8 @@ def films(
     """The same for a film that comes in parts, each made when it is asked for. What stays the same is planned anew only
     where other weights are reached. Of pathways that are ``laid_out_alone`` the layout may be None. Raises ValueError
     for a part without a snapshot."""
-    drawn = gathered(in_direction(network, layout), settings.collapse, settings.pathways)
-    placed, planned, reached, begin = laid_out(drawn, layout), None, np.zeros(0), None
+    drawn, placed = standing(network, layout, settings)
+    planned, reached, begin = None, np.zeros(0), None
     for snapshots in parts:
         if not len(snapshots):
             raise ValueError("a film has at least one frame")

@@ -18,9 +18,9 @@ from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Instance, Network
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import snap
-from neurovis_spec.layout.model import RADIUS, Layout, LayoutProblem, Point
-from neurovis_spec.layout.problem import NamedProblem
-from neurovis_spec.scene.collapse import Gathered
+from neurovis_spec.layout.model import RADIUS, TURNED, Layout, LayoutProblem, Point
+from neurovis_spec.layout.problem import NamedProblem, aspect_of, in_direction
+from neurovis_spec.scene.collapse import Gathered, gathered
 
 #: How a glyph grows with the number of its neurons: so much for ten times as many, and at most.
 _GROWTH, _LARGEST = 0.5, 3.0
@@ -48,11 +48,21 @@ def laid_out_alone(network: Network, settings: RenderSettings) -> bool:
     return settings.pathways and not _placed(network)
 
 
-def laid_out(drawn: Gathered, layout: Layout | None) -> Layout:
-    """The layout of what is drawn in place of the whole, which has this layout; None where it does not matter."""
+def standing(network: Network, layout: Layout | None, settings: RenderSettings) -> tuple[Gathered, Layout]:
+    """What is drawn of a network that has this layout, None where that does not matter, and where it stands; in the
+    direction that the page chose, if it did."""
+    drawn = gathered(in_direction(network, layout), settings.collapse, settings.pathways)
+    found = _laid_out(drawn, layout, settings.size)
+    if found.direction not in (None, drawn.network.layout.direction):
+        drawn = gathered(in_direction(network, found), settings.collapse, settings.pathways)
+    return drawn, found
+
+
+def _laid_out(drawn: Gathered, layout: Layout | None, size: tuple[int, int] | None) -> Layout:
+    """The layout of what is drawn in place of the whole, on a page of this size, if one is asked for."""
     radii = np.array([radius_of(size) for size in drawn.sizes.tolist()])
     if drawn.strands is not None and not _placed(drawn.whole):
-        return _anew(drawn, float(radii.max()) / RADIUS)
+        return _anew(drawn, float(radii.max()) / RADIUS, aspect_of(size))
     assert layout is not None
     if not drawn.any:
         return layout
@@ -82,16 +92,33 @@ def laid_out(drawn: Gathered, layout: Layout | None) -> Layout:
     return Layout(found.network, layout.engine, found.positions, {**found.routes, **kept}, labels)
 
 
-def _anew(drawn: Gathered, larger: float) -> Layout:
-    """Pathways laid out among discs that are all so many times as large as neurons: as if all else were smaller."""
+def _anew(drawn: Gathered, larger: float, aspect: float | None) -> Layout:
+    """Pathways laid out among discs that are all so many times as large as neurons: as if all else were smaller. A page
+    of this ``aspect``, where one is asked for, chooses the direction if nobody says it."""
     spacing = max(1.0, 2 * RADIUS + _TEXT / larger)
-    problem = _problem(drawn, {}, spacing)
-    if problem.direction in ("down", "up"):
-        problem = replace(problem, rank_spacing=_RANKS * problem.rank_spacing)
-    found = lay_out_problem(problem)
+    problem = replace(_problem(drawn, {}, spacing), aspect=aspect, turnable=not drawn.whole.layout.directed)
+    found = _ranked(problem)
+    if problem.turns:
+        across = _ranked(replace(problem, direction="right"))
+        if _side(across, problem.page) < TURNED * _side(found, problem.page):
+            found = replace(across, direction="right")
     positions = {name: _times(point, larger) for name, point in found.positions.items()}
     routes = {name: tuple(_times(point, larger) for point in route) for name, route in found.routes.items()}
-    return Layout(found.network, found.engine, positions, routes)
+    return Layout(found.network, found.engine, positions, routes, direction=found.direction)
+
+
+def _ranked(problem: LayoutProblem) -> Layout:
+    """Pathways laid out in the direction of their problem."""
+    if problem.direction in ("down", "up"):
+        problem = replace(problem, rank_spacing=_RANKS * problem.rank_spacing)
+    return lay_out_problem(replace(problem, turnable=False))
+
+
+def _side(layout: Layout, page: float) -> float:
+    """How high a page has to be, at least, for what is laid out to fit; ``page`` is its width by its height."""
+    points = [*layout.positions.values(), *(point for route in layout.routes.values() for point in route)]
+    wide, high = (np.ptp(np.array(points), axis=0) + 2 * RADIUS).tolist() if points else (0.0, 0.0)
+    return max(wide / page, high)
 
 
 def _times(point: Point, factor: float) -> Point:

@@ -36,10 +36,7 @@ from neurovis_layouts.layered.templates import Book, restricted
 from neurovis_layouts.layered.units import arranged_on_axis
 from neurovis_layouts.pins import with_origins
 from neurovis_spec.layout.labels import BOX_WEIGHT, title_room
-from neurovis_spec.layout.model import Direction, Layout, LayoutMirror, LayoutProblem, Point
-
-#: A page on which a network costs less than this of what it costs from top to bottom has it from left to right.
-_TURNED = 0.85
+from neurovis_spec.layout.model import TURNED, Direction, Layout, LayoutMirror, LayoutProblem, Point
 
 #: A part, the direction in which it is drawn, and whether with routes.
 _Known: TypeAlias = tuple[Part, Direction, bool]
@@ -58,7 +55,7 @@ def directed(problem: LayoutProblem) -> LayoutProblem:
         return problem
     turned = replace(problem, direction="right")
     down, right = (Composer(_framed(one)).cost() for one in (problem, turned))
-    return turned if right < _TURNED * down else problem
+    return turned if right < TURNED * down else problem
 
 
 def checked(problem: LayoutProblem) -> None:

@@ -18,7 +18,7 @@ from neurovis_layouts.finish import alone, drawn, drawn_apart, nearest
 from neurovis_layouts.organic.field import Cooling, GridField, Held, settle
 from neurovis_layouts.organic.flow import in_flow
 from neurovis_layouts.organic.levels import COARSEST, SPARSE, spread, spread_small
-from neurovis_layouts.organic.rows import in_rows
+from neurovis_layouts.organic.rows import directed, in_rows
 from neurovis_layouts.organic.trees import trees_of
 from neurovis_layouts.packing import packed
 from neurovis_layouts.symmetry import Symmetry, about_pins, first_of_pairs, symmetry_of
@@ -66,12 +66,9 @@ class OrganicEngine:
         if problem.pins:
             symmetry, places = _around_pins(problem, wiring, symmetry, places)
         real = places[: len(problem.neurons)]
-        rows = in_rows(problem, real)
-        framed = problem.pins or problem.boxes or symmetry.paired.any() or any(wide for wide, _ in problem.labels)
-        if framed or rows is not real:
-            return drawn_apart(problem, self.name, rows, _APART * problem.neuron_spacing, symmetry)
-        clear = [i for i, edge in enumerate(problem.edges) if planar[edge.source] and edge.source != edge.target]
-        return drawn(problem, self.name, places, alone(problem, clear))
+        chosen = directed(problem, real)
+        found = _drawn(chosen, self.name, places, planar, symmetry)
+        return found if chosen is problem else replace(found, direction=chosen.direction)
 
     def check(self, problem: LayoutProblem) -> None:
         """Raises LayoutRefusalError for mirror images that it cannot draw."""
@@ -85,6 +82,17 @@ class LargeEngine(OrganicEngine):
 
     name = "large"
     capabilities = replace(OrganicEngine.capabilities, suits=None)
+
+
+def _drawn(problem: LayoutProblem, engine: str, places: FloatArray, planar: BoolArray, symmetry: Symmetry) -> Layout:
+    """The layout at places near these (count, 2), of which some are ``planar``."""
+    real = places[: len(problem.neurons)]
+    rows = in_rows(problem, real)
+    framed = problem.pins or problem.boxes or symmetry.paired.any() or any(wide for wide, _ in problem.labels)
+    if framed or rows is not real:
+        return drawn_apart(problem, engine, rows, _APART * problem.neuron_spacing, symmetry)
+    clear = [i for i, edge in enumerate(problem.edges) if planar[edge.source] and edge.source != edge.target]
+    return drawn(problem, engine, places, alone(problem, clear))
 
 
 def _free(problem: LayoutProblem, wiring: Wiring, progress: Progress | None) -> tuple[FloatArray, BoolArray]:

@@ -1,26 +1,44 @@
-"""Rows: a drawing much longer than a page, as of a chain of clusters, cut across, its pieces side by side.
+"""Rows: a drawing much longer than a page, as of a chain of clusters, cut across, its pieces side by side; and the
+direction in which that fits a page that is asked for.
 
-In: a problem and places in the engine's frame. Out: places: as many rows as make it about as long as a page, or columns
-of what is long along the direction. Rows go to and fro, so that what follows each other stays near; columns begin at
-the top each, so that most of what runs along the direction still does: where all does the whole stays. Boxes are cut
-nowhere.
+In: a problem and places in the engine's frame. Out: the problem in that direction (``directed``), and places
+(``in_rows``): as many rows as make it about as long as a page, or columns of what is long along the direction. Rows go
+to and fro, so that what follows each other stays near; columns begin at the top each, so that most of what runs along
+the direction still does: where all does the whole stays. Boxes are cut nowhere.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from neurovis_layouts.boxed import framed
+from neurovis_layouts.frame import to_picture
 from neurovis_layouts.organic.levels import SPARSE
 from neurovis_spec.layout import FloatArray
-from neurovis_spec.layout.model import LayoutProblem
+from neurovis_spec.layout.model import TURNED, LayoutProblem
 
 #: What is longer than a page by this is cut, if it has more neurons than this.
 _LONGEST, _MANY = 2.5, 200
 #: What is free between two rows, in spacings.
 _BETWEEN = 2.0
+
+
+def directed(problem: LayoutProblem, places: FloatArray) -> LayoutProblem:
+    """The problem in the direction in which places (n, 2) fit a smaller page, where the page may choose."""
+    if not problem.turns or not len(places):
+        return problem
+    turned = replace(problem, direction="right")
+    return turned if _side(turned, places) < TURNED * _side(problem, places) else problem
+
+
+def _side(problem: LayoutProblem, places: FloatArray) -> float:
+    """How high a page has to be, at least, for places to fit as they stand in rows, in the problem's direction."""
+    across, along = (np.ptp(in_rows(problem, places), axis=0) + problem.neuron_spacing).tolist()
+    wide, high = to_picture((across, along), problem.direction)
+    return max(wide / problem.page, high)
 
 
 def in_rows(problem: LayoutProblem, places: FloatArray) -> FloatArray:
