@@ -150,8 +150,20 @@ def test_the_area_of_a_disc_and_of_its_ring(radius: float, x: float, y: float) -
     # pixels at the edge count by the distance of their centres: 0.844 at most, where the disc sits on the grid
     centre, radii = np.array([[x, y]]), np.array([radius])
     assert coverage.discs(centre, radii, SIZE).shares.sum() == pytest.approx(math.pi * radius**2, rel=0.01, abs=0.9)
-    around = coverage.rings(centre, radii, np.array([2.0]), SIZE).shares.sum()
+    around = coverage.ringed(centre, radii, np.array([2.0]), SIZE)[1].shares.sum()
     assert around == pytest.approx(math.tau * radius * 2, rel=0.04)
+
+
+@given(st.floats(0.2, 12), st.floats(-20, 180), st.floats(-40, 220), st.floats(0.5, 150), st.booleans(), st.booleans())
+def test_a_line_along_an_axis_covers_what_its_pieces_cover(
+    width: float, across: float, begin: float, long: float, steep: bool, back: bool
+) -> None:
+    ends = [(across, begin), (across, begin + long)] if steep else [(begin, across), (begin + long, across)]
+    (x0, y0), (x1, y1) = ends[::-1] if back else ends
+    line = [(x0 + t * (x1 - x0), y0 + t * (y1 - y0)) for t in (0, 1 / 3, 2 / 3, 1)]
+    halves, opaque = np.array([width / 2], np.float32), np.ones(1, np.float32)
+    bar = coverage.bars(np.array([[(x0, y0), (x1, y1)]]), halves, opaque, SIZE)
+    assert shares(bar) == pytest.approx(shares(stroke(line, width)), abs=0.003)
 
 
 @pytest.mark.parametrize("kind", ["arrow", "bar"])

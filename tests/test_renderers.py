@@ -60,20 +60,21 @@ def test_a_polygon_covers_as_much_as_it_is_large_also_where_others_lie_in_front(
     ways = np.sort(np.array(angles))
     corners = np.array(centre) + radius * np.stack([np.cos(ways), np.sin(ways)], axis=1)
     made = coverage.rounded(corners[None], np.array([margin]))
-    found = coverage.polygons(made - (-100, -100), (300, 300))
+    one, two = np.array([0]), np.array([0, 1])
+    found = coverage.polygons(made - (-100, -100), one, (300, 300)).fragments()
     edges = np.roll(corners, -1, axis=0) - corners
     inner = 0.5 * abs(
         float((corners[:, 0] * np.roll(corners[:, 1], -1) - corners[:, 1] * np.roll(corners[:, 0], -1)).sum())
     )
     area = inner + margin * float(np.hypot(*edges.T).sum()) + np.pi * margin**2
     assert float(found.shares.sum()) == pytest.approx(area, rel=0.03, abs=1.0)
-    page = coverage.polygons(made, (40, 40))
+    page = coverage.polygons(made, one, (40, 40)).fragments()
     there = np.zeros(300 * 300)
     there[found.pixels] = found.shares
     seen = np.zeros(40 * 40)
     seen[page.pixels] = page.shares
     assert seen.reshape(40, 40) == pytest.approx(there.reshape(300, 300)[100:140, 100:140], abs=1 / 256)
-    both = coverage.polygons(np.concatenate([made, made]) - (-100, -100), (300, 300))
+    both = coverage.polygons(np.concatenate([made, made]) - (-100, -100), two, (300, 300)).fragments()
     assert (both.only(both.owners == 1).shares.sum()) == pytest.approx(float(found.shares.sum()), rel=1e-5)
     whole = np.flatnonzero(there == 1)
     assert not np.isin(both.only(both.owners == 0).pixels, whole).any()

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_renderers import coverage
-from neurovis_renderers.coverage import LEAST, BoolArray, Fragments, Heads, Numbers, Pieces, Size, Strokes
+from neurovis_renderers.coverage import LEAST, BoolArray, Filled, Fragments, Heads, Numbers, Pieces, Size, Strokes
 from neurovis_renderers.sheet import LANE, WHOLE, Sheet, lanes, packed, unpacked
 from neurovis_spec.scene import FloatArray, IntArray, Scene
 
@@ -25,8 +25,6 @@ Pixels = npt.NDArray[np.uint8]
 MOST_AT_ONCE = 1 << 21
 #: Shapes, pieces of lines, and pixels that may be touched, that are drawn at a time.
 _MOST_SHAPES, _MOST_PIECES, _MOST_TOUCHED = 1 << 18, 1 << 16, 1 << 20
-#: Pixels for a fragment from which on most are known to be empty.
-_SPARSE = 8
 #: Pixels along the side of a block: a piece of which all blocks are covered is not looked at.
 _BLOCK = 8
 #: So few pieces are drawn without looking whether they are covered.
@@ -82,13 +80,20 @@ class Composed:
     by: IntArray
 
 
-def composed(fragments: Fragments, paints: IntArray, front: int, pixels: int) -> Composed:
-    """Fragments of few shapes in a picture of so many pixels, composed at once."""
-    if len(fragments) * _SPARSE < pixels:
+def composed(fragments: Fragments, filled: Filled, paints: IntArray, front: int, pixels: int) -> Composed:
+    """Fragments of few shapes, and polygons, in a picture of so many pixels, composed at once."""
+    if not len(filled.front):
         return _mostly_alone(fragments, paints, front, pixels)
-    behind = _foremost(fragments, pixels)
-    some = fragments.only(np.flatnonzero(fragments.shares < 1))
-    some = some.only(np.flatnonzero(some.owners > behind[some.pixels]))
+    return _over_filled(coverage.joined([filled.edges, fragments], coverage.NOTHING), filled.front, paints, front)
+
+
+def _over_filled(fragments: Fragments, behind: npt.NDArray[np.int32], paints: IntArray, front: int) -> Composed:
+    """The same over polygons, of which ``behind`` says which is the foremost that covers all of a pixel; it is used
+    up."""
+    whole = fragments.only(np.flatnonzero(fragments.shares >= 1))
+    np.maximum.at(behind, whole.pixels, whole.owners.astype(np.int32))
+    seen = (fragments.shares < 1) & (fragments.owners > behind[fragments.pixels])
+    some = fragments.only(np.flatnonzero(seen))
     by_pixel = slots(some, front)
     left, sums = by_pixel.composed(some.shares, paints[some.owners])
     under = behind[by_pixel.pixels]
@@ -96,7 +101,7 @@ def composed(fragments: Fragments, paints: IntArray, front: int, pixels: int) ->
     left[under >= 0] = 0
     behind[by_pixel.pixels] = -1
     covered = np.flatnonzero(behind >= 0)
-    return Composed(by_pixel.pixels, *_shades(sums, left), covered, behind[covered])
+    return Composed(by_pixel.pixels, *_shades(sums, left), covered, behind[covered].astype(np.int64))
 
 
 def _mostly_alone(fragments: Fragments, paints: IntArray, front: int, pixels: int) -> Composed:
@@ -153,7 +158,8 @@ def portions(sheet: Sheet, low: int, high: int, corner: Size, size: Size, covere
     that are ``covered`` by then: these get no more."""
     while high > low:
         least, pieces = _portion(sheet, low, high, corner, size, covered)
-        solid = sheet.solid(least, high, corner, size)
+        filled = sheet.filled(least, high, corner, size).fragments()
+        solid = coverage.joined([sheet.solid(least, high, corner, size), filled], coverage.NOTHING)
         solid = solid.only(~covered[solid.pixels])
         heads = sheet.heads(least, high, corner, size)
         heads = heads.only(~covered[heads.pixels])

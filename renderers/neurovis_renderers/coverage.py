@@ -21,6 +21,8 @@ Numbers = npt.NDArray[np.float32]
 BoolArray = npt.NDArray[np.bool_]
 Point = tuple[float, float]
 Size = tuple[int, int]  # width, height
+#: a width, and a height or one for each of some shapes
+Extent = tuple[int, int | npt.NDArray[np.int64]]
 
 #: A share below this is no fragment.
 LEAST = 1 / 512
@@ -217,7 +219,7 @@ def extent(pieces: Pieces, halves: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.minimum(pieces.starts, pieces.ends) - reach, np.maximum(pieces.starts, pieces.ends) + reach
 
 
-def strokes(pieces: Pieces, halves: FloatArray, size: Size, hidden: BoolArray | None = None) -> Strokes:
+def strokes(pieces: Pieces, halves: FloatArray, size: Extent, hidden: BoolArray | None = None) -> Strokes:
     """The pixels that strokes touch, of pieces with half widths (n,); not those that are ``hidden``.
 
     Each piece is drawn column by column (row by row where it is steep), so that no pixel is counted twice but where
@@ -253,6 +255,42 @@ def strokes(pieces: Pieces, halves: FloatArray, size: Size, hidden: BoolArray | 
     )
 
 
+def bars(lines: FloatArray, halves: Numbers, opacities: Numbers, size: Extent) -> Fragments:
+    """Lines along an axis, from an end to the other (n, 2, 2), with half widths (n,): what ``strokes`` makes of them,
+    for the share of a pixel is that across the line times that along it."""
+    steep = lines[:, 0, 0] == lines[:, 1, 0]
+    along, across = np.where(steep, lines[:, :, 1].T, lines[:, :, 0].T), np.where(steep, lines[:, 0, 0], lines[:, 0, 1])
+    long, wide = np.where(steep, size[1], size[0]), np.where(steep, size[0], size[1])
+    begin, end = along.min(axis=0), along.max(axis=0)
+    first, count = _clipped(np.ceil(begin - 1.5), np.ceil(end + 0.5), long)
+    line, place = _ranges(count)
+    middles = place + first[line] + 0.5
+    within = np.clip(0.5 + (middles - begin[line]), 0, 1).astype(np.float32)
+    within *= np.clip(0.5 - (middles - end[line]), 0, 1)
+    within *= np.float32(0.5)
+    top, rows = _clipped(np.floor(across - halves), np.floor(across + halves) + 1, wide)
+    owner, row = _ranges(rows)
+    away = (((top - across).astype(np.float32) + np.float32(0.5))[owner] + row).astype(np.float32)
+    covers = _band(away, halves[owner])
+    start = top[owner] + row
+    at, stride = start * np.where(steep, 1, size[0])[owner], np.where(steep, size[0], 1)
+    counts = count[owner]
+    each = np.repeat(np.arange(len(owner)), counts)
+    which = _spans((np.cumsum(count) - count)[owner], counts)
+    pixels = np.repeat(at + (first * stride)[owner], counts) + place[which] * stride[owner][each]
+    shares = 2 * covers[each]
+    shares *= within[which]
+    np.minimum(shares, np.clip(halves + np.float32(0.5), 0, 1)[owner][each], out=shares)
+    shares *= opacities[owner][each]
+    return _fragments(owner[each], pixels, shares)
+
+
+def _clipped(begin: FloatArray, end: FloatArray, most: IntArray | int) -> tuple[IntArray, IntArray]:
+    """Where something begins, and how many there are up to its end, of no more than from 0 to ``most``."""
+    first = np.clip(begin, 0, most).astype(np.int64)
+    return first, np.maximum(np.clip(end, 0, most).astype(np.int64) - first, 0)
+
+
 @dataclass(frozen=True, slots=True)
 class _Runs:
     """Pieces (n,) as they are drawn: from (u0, v0) to u1, where u counts columns, and grows, and v rows; the other way
@@ -285,7 +323,7 @@ def _runs(pieces: Pieces) -> _Runs:
     return _Runs(steep, u0, u1, v0, slope, np.hypot(1.0, slope), before, after, opens, closes)
 
 
-def _columns(runs: _Runs, halves: FloatArray, size: Size) -> tuple[IntArray, IntArray]:
+def _columns(runs: _Runs, halves: FloatArray, size: Extent) -> tuple[IntArray, IntArray]:
     """The columns that pieces with half widths (n,) touch: of each the piece, and its number."""
     sideways = halves * np.abs(runs.slope) / runs.secant  # how far the corners of a butt end reach along the columns
     share = sideways / np.maximum(halves, 1e-9)
@@ -336,10 +374,12 @@ def _spans(begins: IntArray, counts: IntArray) -> IntArray:
     return result
 
 
-def _boxes(low: FloatArray, high: FloatArray, size: Size) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+def _boxes(low: FloatArray, high: FloatArray, size: Extent) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
     """The pixels of boxes (n, 2) to (n, 2): which box, the pixel, and where its centre is."""
-    first = np.clip(np.floor(low), 0, size).astype(np.int64)
-    count = np.maximum(np.clip(np.ceil(high), 0, size).astype(np.int64) - first, 0)
+    most = np.empty((len(low), 2), np.int64)
+    most[:, 0], most[:, 1] = size
+    first = np.clip(np.floor(low), 0, most).astype(np.int64)
+    count = np.maximum(np.clip(np.ceil(high), 0, most).astype(np.int64) - first, 0)
     line, place = _ranges(count[:, 1] * (count[:, 0] > 0))
     y = place + first[line, 1]
     row, place = _ranges(count[line, 0])
@@ -348,7 +388,7 @@ def _boxes(low: FloatArray, high: FloatArray, size: Size) -> tuple[IntArray, Int
     return line[row], y * size[0] + x, x + 0.5, y + 0.5
 
 
-def _fragments(owners: IntArray, pixels: IntArray, shares: FloatArray) -> Fragments:
+def _fragments(owners: IntArray, pixels: IntArray, shares: FloatArray | Numbers) -> Fragments:
     there = shares > LEAST
     return Fragments(owners[there], pixels[there], shares[there].astype(np.float32))
 
@@ -360,12 +400,13 @@ def discs(centres: FloatArray, radii: FloatArray, size: Size) -> Fragments:
     return _fragments(which, pixels, np.clip(radii[which] + 0.5 - away, 0, 1))
 
 
-def rings(centres: FloatArray, radii: FloatArray, widths: FloatArray, size: Size) -> Fragments:
-    """Outlines of circles."""
+def ringed(centres: FloatArray, radii: FloatArray, widths: FloatArray, size: Extent) -> tuple[Fragments, Fragments]:
+    """Filled circles, and their outlines."""
     reach = (radii + widths / 2)[:, None] + 1
     which, pixels, x, y = _boxes(centres - reach, centres + reach, size)
-    away = np.abs(np.hypot(x - centres[which, 0], y - centres[which, 1]) - radii[which])
-    return _fragments(which, pixels, _line(away, widths[which] / 2))
+    away, rims = np.hypot(x - centres[which, 0], y - centres[which, 1]), radii[which]
+    edges = _line(np.abs(away - rims), widths[which] / 2)
+    return _fragments(which, pixels, np.clip(rims + 0.5 - away, 0, 1)), _fragments(which, pixels, edges)
 
 
 def _line(away: FloatArray, half: FloatArray | float) -> FloatArray:
@@ -414,7 +455,7 @@ def _between(place: Numbers, begin: Numbers, end: Numbers) -> Numbers:
     return np.clip(share, 0, 1, out=share)
 
 
-def heads(tips: FloatArray, ways: FloatArray, lengths: FloatArray, halves: FloatArray, size: Size) -> Heads:
+def heads(tips: FloatArray, ways: FloatArray, lengths: FloatArray, halves: FloatArray, size: Extent) -> Heads:
     """The pixels of heads: at ``tips``, along the unit vectors ``ways``, (n,) long and half as wide."""
     backs = tips - lengths[:, None] * ways
     across = halves[:, None] * np.stack([-ways[:, 1], ways[:, 0]], axis=1)
@@ -453,28 +494,44 @@ def rounded(corners: FloatArray, margins: FloatArray) -> FloatArray:
     return result.reshape(len(corners), -1, 2)
 
 
-def polygons(corners: FloatArray, size: Size, begins: IntArray | None = None) -> Fragments:
-    """Filled convex polygons of k corners each (n, k, 2), in order, later ones in front of others: a pixel is cut into
-    ``_SLICES`` rows, of which it is known exactly how much of each lies inside. What is hidden by another of them is
-    left out. Where they lie on several pictures, ``begins`` (n,) is the first pixel of that of each."""
+@dataclass(frozen=True, slots=True)
+class Filled:
+    """What polygons cover: of the first pixels of a picture the foremost polygon that covers all of each, −1 where none
+    does; and what others cover in part."""
+
+    front: npt.NDArray[np.int32]
+    edges: Fragments
+
+    def fragments(self) -> Fragments:
+        """All of it as fragments."""
+        whole = np.flatnonzero(self.front >= 0)
+        covered = Fragments(self.front[whole].astype(np.int64), whole, np.ones(len(whole), np.float32))
+        return joined([covered, self.edges], NOTHING)
+
+
+NOT_FILLED = Filled(np.empty(0, np.int32), NOTHING)
+
+
+def polygons(corners: FloatArray, owners: IntArray, size: Extent, begins: IntArray | None = None) -> Filled:
+    """Filled convex polygons of k corners each (n, k, 2), in the order of their ``owners`` (n,), later ones in front of
+    others: a pixel is cut into ``_SLICES`` rows, of which it is known exactly how much of each lies inside. What is
+    hidden by another of them is left out. Where they lie on several pictures, ``begins`` (n,) is the first pixel of
+    that of each."""
     if not len(corners):
-        return NOTHING
-    first = np.clip(np.floor(corners[:, :, 1].min(axis=1)), 0, size[1]).astype(np.int64)
-    last = np.clip(np.ceil(corners[:, :, 1].max(axis=1)), 0, size[1]).astype(np.int64)
-    rows = np.maximum(last - first, 0)
+        return NOT_FILLED
+    first, rows = _clipped(np.floor(corners[:, :, 1].min(axis=1)), np.ceil(corners[:, :, 1].max(axis=1)), size[1])
     left, right = np.clip(_sides(corners, first, rows), 0, size[0])
-    owner = np.repeat(np.arange(len(corners), dtype=np.int32), rows)
+    owner = np.repeat(owners.astype(np.int32), rows)
     corner = np.zeros(len(corners), np.int64) if begins is None else begins
     begin = np.arange(len(owner)) * size[0] + np.repeat((first - np.cumsum(rows) + rows) * size[0] + corner, rows)
     low, high = np.floor(left.min(axis=0)).astype(np.int64), np.ceil(right.max(axis=0)).astype(np.int64)
     inner, outer = np.ceil(left.max(axis=0)).astype(np.int64), np.floor(right.min(axis=0)).astype(np.int64)
     inner = np.minimum(inner, high)
     outer = np.clip(outer, inner, high)
-    front = np.full(int(corner.max()) + size[0] * size[1], -1, np.int32)
+    front = np.full(int((corner + size[0] * size[1]).max()), -1, np.int32)
     # owners ascend, and the last one stays
     front[_spans(begin + inner, outer - inner)] = np.repeat(owner, outer - inner)
-    whole = np.flatnonzero(front >= 0)
-    parts = [Fragments(front[whole].astype(np.int64), whole, np.ones(len(whole), np.float32))]
+    parts = []
     for start, end in ((low, inner), (outer, high)):
         counts = np.maximum(end - start, 0)
         pixels, row = _spans(begin + start, counts), np.repeat(np.arange(len(owner)), counts)
@@ -485,7 +542,7 @@ def polygons(corners: FloatArray, size: Size, begins: IntArray | None = None) ->
         within -= np.maximum(np.take(left, row, axis=1), x)
         np.clip(within, 0, 1, out=within)
         parts.append(_fragments(owner[row].astype(np.int64), pixels, within.sum(axis=0) / _SLICES))
-    return joined(parts, NOTHING)
+    return Filled(front, joined(parts, NOTHING))
 
 
 def _sides(corners: FloatArray, first: IntArray, rows: IntArray) -> Numbers:

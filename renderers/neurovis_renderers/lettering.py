@@ -52,24 +52,28 @@ def _some(characters: list[str]) -> str:
     return ", ".join(f"'{c}'" if c.isprintable() else f"U+{ord(c):04X}" for c in characters[:3]) + more
 
 
-def lettering(text: Text, size: Size, halo: bool = False) -> Fragments:
-    """The fragments of a text with its subscript, or of its ``halo``, in a picture of this size."""
-    bold = text.weight >= BOLD
-    runs = [(text.text, text.size, 0.0)]
+def lettering(
+    text: Text, size: Size, halo: bool = False, density: float = 1.0, corner: tuple[int, int] = (0, 0)
+) -> Fragments:
+    """The fragments of a text with its subscript, or of its ``halo``, in a picture of this size, which begins at a
+    ``corner`` in pixels, of which there are ``density`` in a unit."""
+    bold, points = text.weight >= BOLD, text.size * density
+    runs = [(text.text, points, 0.0)]
     if text.subscript:
-        runs.append((text.subscript, SUBSCRIPT_SIZE * text.size, SUBSCRIPT_DROP * text.size))
-    long = sum(_length(words, points, bold) for words, points, _ in runs)
-    # what reads upward is drawn where it stands before it is turned by a quarter about the picture's corner
-    x, baseline = (-text.point[1], text.point[0]) if text.upward else text.point
+        runs.append((text.subscript, SUBSCRIPT_SIZE * points, SUBSCRIPT_DROP * points))
+    long = sum(_length(words, size_of, bold) for words, size_of, _ in runs)
+    x, baseline = text.point[0] * density - corner[0], text.point[1] * density - corner[1]
+    if text.upward:  # drawn where it stands before it is turned by a quarter about the picture's corner
+        x, baseline = -baseline, x
     x -= {"start": 0.0, "middle": long / 2, "end": long}[text.anchor]
-    reach = math.ceil(HALO * text.size) if halo else 0
-    left, top = math.floor(x) - 2 - reach, math.floor(baseline - 1.2 * text.size) - 1 - reach
+    reach = math.ceil(HALO * points) if halo else 0
+    left, top = math.floor(x) - 2 - reach, math.floor(baseline - 1.2 * points) - 1 - reach
     begin = (x - left) * _FINER
-    if all(_stand_alone(words, points, bold) for words, points, _ in runs):
+    if all(_stand_alone(words, size_of, bold) for words, size_of, _ in runs):
         begin = math.floor(begin + _HALF)
     # on a whole pixel, as browsers have it
-    lines = tuple((words, points, math.floor(baseline + drop + 0.5) - top) for words, points, drop in runs)
-    stroke = round(HALO * text.size * _FINER) if halo else 0
+    lines = tuple((words, size_of, math.floor(baseline + drop + 0.5) - top) for words, size_of, drop in runs)
+    stroke = round(HALO * points * _FINER) if halo else 0
     rows, columns, share, (high, wide) = _glyphs(lines, bold, begin, (reach, stroke), text.upward)
     if text.upward:
         left, top = top, -left - high

@@ -18,7 +18,7 @@ from neurovis_renderers import coverage
 from neurovis_renderers.apart import FRAMES, Laid, laid
 from neurovis_renderers.canvas import COVERED, Pixels, Stack, bands, portions, slots
 from neurovis_renderers.coverage import BoolArray, Fragments, Heads, Numbers, Size, Strokes
-from neurovis_renderers.sheet import LANE, WHOLE, Sheet, lanes, packed, packed_all
+from neurovis_renderers.sheet import LANE, WHOLE, Sheet, Words, lanes, lanes_of, packed, packed_all
 from neurovis_spec.scene import (
     HEAD_MORE,
     HEAD_OF_LENGTH,
@@ -44,7 +44,6 @@ _STEP = np.float32(1 / 64)
 _MUCH = 0.4
 #: Fragments that are kept of a band.
 MOST_KEPT = 6_000_000
-_Words = npt.NDArray[np.uint32]
 #: How lines end, as a Film has it.
 _Ends = npt.NDArray[np.int8]
 
@@ -268,7 +267,7 @@ def _sorted_out(
     return kept, seen & ~kept
 
 
-def _words(sums: IntArray) -> _Words:
+def _words(sums: IntArray) -> Words:
     """The same as red, green, blue and nothing, a byte each."""
     rounded = sums + (WHOLE // 2) * (1 | 1 << LANE | 1 << 2 * LANE)
     result = rounded >> 13 & 255
@@ -277,32 +276,17 @@ def _words(sums: IntArray) -> _Words:
     return result.astype(np.uint32)
 
 
-def _over(one: Laid, behind: _Words) -> _Words:
-    """What stands apart in front of the pixels that it lies over in part."""
+def _over(one: Laid, behind: Words) -> Words:
+    """What stands apart in front of the pixels that it lies over in part, which look so."""
     weights = np.rint(one.fragments.shares * WHOLE).astype(np.int64)
-    return _words(one.colours * weights + _lanes_of(behind) * (WHOLE - weights))
+    return _words(one.colours * weights + lanes_of(behind) * (WHOLE - weights))
 
 
-def _bytes(colours: IntArray) -> _Words:
-    """Packed colours as red, green, blue and nothing, a byte each."""
-    result = colours & 255
-    result |= colours >> LANE - 8 & 255 << 8
-    result |= colours >> 2 * LANE - 16 & 255 << 16
-    return result.astype(np.uint32)
-
-
-def _three(picture: _Words) -> Pixels:
+def _three(picture: Words) -> Pixels:
     """Red, green and blue alone, (n, 3): each word is written over the fourth byte of the one before."""
     result = np.empty(3 * len(picture) + 1, np.uint8)
     np.ndarray(picture.shape, np.uint32, result.data, 0, (3,))[:] = picture
     return result[:-1].reshape(-1, 3)
-
-
-def _lanes_of(words: _Words) -> IntArray:
-    """Red, green and blue, a byte each, as packed colours."""
-    wide = words.astype(np.int64)
-    result: IntArray = wide & 255 | (wide >> 8 & 255) << LANE | (wide >> 16 & 255) << 2 * LANE
-    return result
 
 
 class Painter:
@@ -419,46 +403,48 @@ class _Painted:
         """Draw what stands apart, at the frames of a run; only what is not as it was before."""
         band, density = self._band, self._moving.sheet.density
         columns, last = list[list[Laid]](), list[tuple[Group, Laid]]()
+        changed, new = list[list[bool]](), list[Group]()
         for number in range(len(self._moving.apart_places)):
             groups = [groups[number] for groups in stills]
             before = [self._last[number][0] if self._last else None, *groups]
-            changed = [group != earlier for group, earlier in zip(groups, before, strict=False)]
-            new = [group for group, is_new in zip(groups, changed, strict=True) if is_new]
-            drawn = iter(laid(new, density, band.top, band.size) if new else ())
+            changed.append([group != earlier for group, earlier in zip(groups, before, strict=False)])
+            new += [group for group, is_new in zip(groups, changed[-1], strict=True) if is_new]
+        drawn = iter(laid(new, density, band.top, band.size) if new else ())
+        for number, row in enumerate(changed):
             column = [self._last[number][1]] if self._last else []
-            for is_new in changed:
+            for is_new in row:
                 column.append(next(drawn) if is_new else column[-1])
-            columns.append(column[-len(groups) :])
-            last.append((groups[-1], column[-1]))
+            columns.append(column[-len(row) :])
+            last.append((stills[-1][number], column[-1]))
         self._apart, self._last = [list(row) for row in zip(*columns, strict=True)], last
 
     def with_apart(self, number: int, colours: IntArray) -> Pixels:
         """The picture with the groups that stand apart, at a frame of the run, (height, width, 3)."""
         wide, high = self._band.size
         apart = self._apart[number] if self._apart else []
-        among, picture, covered = len(apart) - self._moving.last, self._picture, list[tuple[IntArray, _Words]]()
+        among, picture, covered = len(apart) - self._moving.last, self._picture, list[tuple[IntArray, Words]]()
 
-        def put(pixels: IntArray, words: _Words) -> None:
-            covered.append((pixels, picture[pixels]))
+        def put(pixels: IntArray, words: Words, before: Words) -> None:
+            covered.append((pixels, before))
             picture[pixels] = words
 
         some = [one.as_fragments(place) for one, place in zip(apart[:among], self._moving.apart_places, strict=False)]
         if any(len(fragments) for fragments, _ in some):
-            put(*self._composed(some, colours))
+            pixels, words = self._composed(some, colours)
+            put(pixels, words, picture[pixels])
         for one in apart[among:]:
-            put(one.covered, _bytes(one.covering))
-            put(one.fragments.pixels, _over(one, picture[one.fragments.pixels]))
+            put(one.covered, one.covering, picture[one.covered])
+            before = picture[one.fragments.pixels]
+            put(one.fragments.pixels, _over(one, before), before)
         result = _three(picture).reshape(high, wide, 3)
         for pixels, words in reversed(covered):
             picture[pixels] = words
         return result
 
-    def _composed(self, apart: list[tuple[Fragments, IntArray]], colours: IntArray) -> tuple[IntArray, _Words]:
+    def _composed(self, apart: list[tuple[Fragments, IntArray]], colours: IntArray) -> tuple[IntArray, Words]:
         """The pixels in which some of what stands apart is seen, and how they look, with all that lies there."""
-        marked = np.zeros(len(self._picture), bool)
-        for fragments, _ in apart:
-            marked[fragments.pixels] = True
-        pixels = np.flatnonzero(marked)
+        pixels = np.sort(np.concatenate([fragments.pixels for fragments, _ in apart]))
+        pixels = pixels[np.diff(pixels, prepend=-1) > 0]
         band, front = self._band, len(self._moving.sheet)
         stack = Stack(len(pixels))
         parts = [replace(one, pixels=np.searchsorted(pixels, one.pixels)) for one, _ in apart]

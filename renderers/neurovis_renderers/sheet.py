@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_renderers import coverage
-from neurovis_renderers.coverage import BoolArray, Fragments, Heads, Numbers, Pieces, Size, Strokes
+from neurovis_renderers.coverage import BoolArray, Extent, Filled, Fragments, Heads, Numbers, Pieces, Size, Strokes
 from neurovis_renderers.lettering import lettering
 from neurovis_spec.scene import (
     Arrowhead,
@@ -39,6 +39,8 @@ from neurovis_spec.scene import (
 #: A colour and its weight are whole numbers: red, green and blue times a weight of at most ``WHOLE`` stand side by side
 #: in one integer of 64 bits, ``LANE`` bits each, and are added at once.
 WHOLE, LANE = 1 << 13, 21
+#: Colours as red, green, blue and nothing, a byte each.
+Words = npt.NDArray[np.uint32]
 #: No letter is wider, in sizes of its text.
 _WIDEST = 2.0
 
@@ -86,25 +88,45 @@ def lanes(sums: IntArray) -> IntArray:
     return result
 
 
+def bytes_of(colours: IntArray) -> Words:
+    """Packed colours as red, green, blue and nothing, a byte each."""
+    result = colours & 255
+    result |= colours >> LANE - 8 & 255 << 8
+    result |= colours >> 2 * LANE - 16 & 255 << 16
+    return result.astype(np.uint32)
+
+
+def lanes_of(words: Words) -> IntArray:
+    """Red, green and blue, a byte each, as packed colours."""
+    wide = words.astype(np.int64)
+    result: IntArray = wide & 255 | (wide >> 8 & 255) << LANE | (wide >> 16 & 255) << 2 * LANE
+    return result
+
+
 class Sheet:
     """The shapes of groups, each with its place in the order (0 is the furthest back), its colour and its opacity."""
 
-    def __init__(self, groups: Sequence[Group], density: float, left_out: Collection[str] = ()) -> None:
-        """Groups whose id is in ``left_out`` have their places, but nothing is drawn there."""
-        self.density = density
+    def __init__(
+        self, groups: Sequence[Group], density: float, left_out: Collection[str] = (), bars: bool = False
+    ) -> None:
+        """Groups whose id is in ``left_out`` have their places, but nothing is drawn there. With ``bars`` lines along
+        an axis are drawn as what they are, rectangles, and not by pieces: that is quicker, and as good as the same."""
+        self.density, self._with_bars = density, bars
         self.colours: list[int] = []
         #: where each shape of a group begins in the order: ``places[group][shape]``
         self.places: list[list[int]] = []
         #: where each group begins in the order
         self.firsts: list[int] = []
-        #: of shapes on several pictures the first pixel of that of each, and where that lies on the sheet, by its place
+        #: of shapes on pages the first pixel of that of each, its rows, and where it lies on the sheet, by its place
         self._begins: IntArray | None = None
+        self._rows: IntArray = np.empty(0, np.int64)
         self._corners: IntArray = np.empty((0, 2), np.int64)
         #: groups with an opacity of their own: first and last place, opacity
         self.veiled: list[tuple[int, int, float]] = []
         self._splines: list[tuple[int, Spline]] = []
         self._heads: list[tuple[int, Arrowhead]] = []
         self._discs: list[tuple[int, Disc]] = []
+        self._bars: list[tuple[int, Polyline]] = []
         #: place, corners, margin
         self._polygons: list[tuple[int, tuple[Point, ...], float]] = []
         #: first place, the place above the last
@@ -138,6 +160,10 @@ class Sheet:
                 return False
             case Polyline() if shape.round and len(shape.points) == 2 and shape.opacity == 1:
                 self._polygons.append((place, shape.points, shape.width / 2))
+                self.colours.append(packed(shape.stroke))
+                return False
+            case Polyline() if self._with_bars and not shape.round and _is_straight(shape.points):
+                self._bars.append((place, shape))
                 self.colours.append(packed(shape.stroke))
                 return False
             case Polyline():
@@ -194,6 +220,7 @@ class Sheet:
         result[places] = (2 * table[:, 2] + 2) ** 2
         places, corners = self._polygon_arrays
         result[places] = np.prod(np.ptp(corners, axis=1), axis=1)
+        result[self._bar_arrays[0]] = self._bar_areas
         for place, _, shape in self._others:
             if isinstance(shape, Rectangle | Ramp | Image):
                 result[place] = shape.width * shape.height * self.density**2
@@ -236,9 +263,9 @@ class Sheet:
         assert result.pieces is shared[0]
         return result
 
-    def on_pages(self, page_of: IntArray, corners: IntArray, size: Size) -> Sheet:
-        """The same with shapes on pictures of one size, one after the other: which each is on, by its place, and which
-        pixel of the sheet is the first of each picture, (pictures, 2)."""
+    def on_pages(self, page_of: IntArray, corners: IntArray, wide: int, rows: IntArray) -> Sheet:
+        """The same with shapes on pages of one width, one after the other: which each is on, by its place, which pixel
+        of the sheet is the first of each page, (pages, 2), and how many rows that has."""
         result = copy(self)
         shifts = corners[page_of]
         moved = {}
@@ -247,9 +274,13 @@ class Sheet:
             moved[name] = places, np.concatenate([table[:, :2] - shifts[places], table[:, 2:]], axis=1)
         places, outlines = self._polygon_arrays
         moved["_polygon_arrays"] = places, outlines - shifts[places][:, None]
+        places, bars = self._bar_arrays
+        twice = np.tile(shifts[places], 2)
+        moved["_bar_arrays"] = places, np.concatenate([bars[:, :4] - twice, bars[:, 4:]], axis=1)
         by = shifts[self.pieces.owners]
         pieces = replace(self.pieces, starts=self.pieces.starts - by, ends=self.pieces.ends - by)
-        result.__dict__.update(moved, pieces=pieces, _corners=shifts, _begins=page_of * (size[0] * size[1]))
+        begins = (wide * (np.cumsum(rows) - rows))[page_of]
+        result.__dict__.update(moved, pieces=pieces, _corners=shifts, _begins=begins, _rows=rows[page_of])
         return result
 
     def stroke_shares(self, made: Strokes) -> Numbers:
@@ -310,6 +341,21 @@ class Sheet:
         return np.array([place for place, _ in self._discs], np.int64), table
 
     @cached_property
+    def _bar_arrays(self) -> tuple[IntArray, FloatArray]:
+        """Places of bars; of each where it begins and ends, half its width, its opacity."""
+        rows = [(*bar.points[0], *bar.points[1], bar.width / 2, bar.opacity) for _, bar in self._bars]
+        table = np.array(rows, float).reshape(-1, 6)
+        table[:, :5] *= self.density
+        return np.array([place for place, _ in self._bars], np.int64), table
+
+    @cached_property
+    def _bar_areas(self) -> FloatArray:
+        """How many pixels each bar may touch."""
+        table = self._bar_arrays[1]
+        result: FloatArray = np.prod(np.abs(table[:, 2:4] - table[:, :2]) + 2 * table[:, 4:5] + 2, axis=1)
+        return result
+
+    @cached_property
     def _polygon_arrays(self) -> tuple[IntArray, FloatArray]:
         """Places of polygons, and their corners in pixels, (n, k, 2), of those with few the last several times."""
         alike: dict[int, list[int]] = {}
@@ -331,79 +377,110 @@ class Sheet:
         places, table = _between(*self._head_arrays, low, high)
         if not len(places):
             return coverage.NO_HEADS
-        tips = table[:, :2] - corner
-        near = _reaches(tips[:, 1], table[:, 4] + table[:, 5], size)
-        found = coverage.heads(tips[near], table[near, 2:4], table[near, 4], table[near, 5], size)
-        owners = places[near][found.owners]
+        tips, extent = table[:, :2] - corner, self._extent(places, size)
+        near = _reaches(tips[:, 1], table[:, 4] + table[:, 5], extent)
+        places, tips, table = places[near], tips[near], table[near]
+        found = coverage.heads(tips, table[:, 2:4], table[:, 4], table[:, 5], self._extent(places, size))
+        owners = places[found.owners]
         return replace(found, owners=owners, pixels=self._on_page(found.pixels, owners))
 
+    def filled(self, low: int, high: int, corner: Size, size: Size) -> Filled:
+        """The polygons among shapes ``low`` to ``high``, in pixels from a ``corner`` on."""
+        places, corners = _between(*self._polygon_arrays, low, high)
+        begins = None if self._begins is None else self._begins[places]
+        return coverage.polygons(corners - corner, places, self._extent(places, size), begins)
+
     def solid(self, low: int, high: int, corner: Size, size: Size) -> Fragments:
-        """The fragments of all but solid splines and heads, of shapes ``low`` to ``high``, in pixels from a ``corner``
-        on."""
+        """The fragments of all but solid splines, heads and polygons, of shapes ``low`` to ``high``, in pixels from a
+        ``corner`` on."""
         found = []
         places, table = _between(*self._disc_arrays, low - 1, high)
         if len(places):
-            near = _reaches(table[:, 1] - corner[1], table[:, 2] + table[:, 3], size)
-            places, centres, radii, widths = places[near], table[near, :2] - corner, table[near, 2], table[near, 3]
-            found.append(self._owned(coverage.discs(centres, radii, size), places))
-            found.append(self._owned(coverage.rings(centres, radii, widths, size), places + 1))
-        places, corners = _between(*self._polygon_arrays, low, high)
+            near = _reaches(table[:, 1] - corner[1], table[:, 2] + table[:, 3], self._extent(places, size))
+            places, table = places[near], table[near]
+            discs = coverage.ringed(table[:, :2] - corner, table[:, 2], table[:, 3], self._extent(places, size))
+            found += [self._owned(each, places + number) for number, each in enumerate(discs)]
+        places, table = _between(*self._bar_arrays, low, high)
         if len(places):
-            begins = None if self._begins is None else self._begins[places]
-            some = coverage.polygons(corners - corner, size, begins)
-            found.append(replace(some, owners=places[some.owners]))
+            ends, (halves, opacities) = table[:, :4].reshape(-1, 2, 2) - corner, table[:, 4:].T.astype(np.float32)
+            found.append(self._owned(coverage.bars(ends, halves, opacities, self._extent(places, size)), places))
         for place, end, shape in self._others:
             if place < high and end > low:
-                parts = self._other(shape, self._corner_of(place, corner), size)
+                parts = self._other(shape, *self._page_of(place, corner, size))
                 found += [self._owned(part, np.arange(place + number, end)) for number, part in enumerate(parts)]
         made = coverage.joined(found, coverage.NOTHING)
         return made.only((made.owners >= low) & (made.owners < high)) if low or high < len(self) else made
 
-    def most(self, size: Size) -> float:
-        """How many fragments there may be in a picture of a size, at most, about."""
-        texts = [shape for _, _, shape in self._others if isinstance(shape, Text)]
-        whole = len(self._others) - len(texts) + 2 * bool(self._polygons)
-        letters = sum(6 * shape.size**2 * (len(shape.text) + len(shape.subscript) + 2) for shape in texts)
-        discs, heads = self._disc_arrays[1], self._head_arrays[1]
-        round_ = 8 * ((discs[:, 2] + discs[:, 3] + 1) ** 2).sum() + 4 * (heads[:, 4:].sum(axis=1) ** 2).sum()
-        length = np.hypot(*(self.pieces.ends - self.pieces.starts).T)
-        halves = self.halves[self.pieces.owners] + 2
-        lines = (np.minimum(length + 2 * halves, sum(size)) * 3 * halves).sum()
-        return whole * size[0] * size[1] + letters * self.density**2 + float(round_ + lines)
+    def most(self, page_of: IntArray, sizes: IntArray) -> float:
+        """How many fragments there may be at most, about, on pages of these sizes, (pages, 2), by the page that each
+        shape is on."""
+        areas, letters, whole = sizes.prod(axis=1), 0.0, 0.0
+        for place, _, shape in self._others:
+            if isinstance(shape, Text):
+                letters += 6 * shape.size**2 * (len(shape.text) + len(shape.subscript) + 2)
+            else:
+                whole += areas[page_of[place]]
+        if self._polygons:
+            whole += 2 * areas.sum()
+        if self._discs or self._heads:
+            discs, heads = self._disc_arrays[1], self._head_arrays[1]
+            whole += 8 * ((discs[:, 2] + discs[:, 3] + 1) ** 2).sum() + 4 * (heads[:, 4:].sum(axis=1) ** 2).sum()
+        if self._bars:
+            whole += np.minimum(self._bar_areas, areas[page_of[self._bar_arrays[0]]]).sum()
+        if self._splines:
+            pieces, halves = self.pieces, self.halves[self.pieces.owners] + 2
+            length = np.hypot(*(pieces.ends - pieces.starts).T) + 2 * halves
+            whole += (np.minimum(length, sizes.sum(axis=1)[page_of[pieces.owners]]) * 3 * halves).sum()
+        return float(whole + letters * self.density**2)
 
     def extents(self, page_of: IntArray, pages: int) -> tuple[FloatArray, FloatArray]:
         """The least and the greatest place at which anything may be seen of the shapes of each page, by the page that
         each is on (by its place); (pages, 2) each, in pixels."""
-        low, high = np.full((pages, 2), np.inf), np.full((pages, 2), -np.inf)
+        ends = np.full((pages, 4), np.inf)
 
         def reach(places: IntArray, least: FloatArray, most: FloatArray) -> None:
-            np.minimum.at(low, page_of[places], least)
-            np.maximum.at(high, page_of[places], most)
+            page = page_of[places]  # in order, as places are
+            begins = np.flatnonzero(np.diff(page, prepend=-1))
+            some = page[begins]
+            ends[some] = np.minimum(ends[some], np.minimum.reduceat(np.concatenate([least, -most], axis=1), begins))
 
         if self._polygons:
             places, corners = self._polygon_arrays
-            reach(places, corners.min(axis=1), corners.max(axis=1))
+            each = np.ascontiguousarray(corners.transpose(1, 0, 2))  # NumPy is slow along an axis in the middle
+            reach(places, each.min(axis=0), each.max(axis=0))
         for places, table, beyond in (
             (*self._disc_arrays, self._disc_arrays[1][:, 2:4]),
             (*self._head_arrays, self._head_arrays[1][:, 4:6]),
         ):
-            around = beyond.sum(axis=1)[:, None]
-            reach(places, table[:, :2] - around, table[:, :2] + around)
-        if self._splines:
+            if len(places):
+                around = beyond.sum(axis=1)[:, None]
+                reach(places, table[:, :2] - around, table[:, :2] + around)
+        if self._bars:
+            places, table = self._bar_arrays
+            around = table[:, 4:5] + 1.5
+            reach(
+                places,
+                *(np.minimum(table[:, :2], table[:, 2:4]) - around, np.maximum(table[:, :2], table[:, 2:4]) + around),
+            )
+        if len(self.pieces):
             halves = self.halves[self.pieces.owners].astype(float)
             reach(self.pieces.owners, *coverage.extent(self.pieces, halves))
         others = [(place, *corner) for place, _, shape in self._others for corner in _reach(shape)]
         if others:
             corners, around = (np.array([each[part] for each in others]) * self.density for part in (1, 2))
             reach(np.array([place for place, _, _ in others]), corners - around, corners + around)
-        return low, high
+        return ends[:, :2], -ends[:, 2:]
 
-    def _corner_of(self, place: int, corner: Size) -> Size:
-        """The first pixel of the picture that a shape is on."""
+    def _extent(self, places: IntArray, size: Size) -> Extent:
+        """The extent of the picture that each of some shapes is on."""
+        return size if self._begins is None else (size[0], self._rows[places])
+
+    def _page_of(self, place: int, corner: Size, size: Size) -> tuple[Size, Size]:
+        """The first pixel of the picture that a shape is on, and its size."""
         if self._begins is None:
-            return corner
+            return corner, size
         x, y = self._corners[place].tolist()
-        return x + corner[0], y + corner[1]
+        return (x + corner[0], y + corner[1]), (size[0], int(self._rows[place]))
 
     def _owned(self, part: Fragments, places: IntArray) -> Fragments:
         """Fragments of shapes with these places."""
@@ -440,10 +517,11 @@ class Sheet:
                 shade = np.unique(shades, return_inverse=True)[1][cells]
                 return [Fragments(shade, where, np.ones(len(where), np.float32))]
             case Text():
-                text = replace(shape, point=pixels(shape.point), size=shape.size * density)
-                if not (text.upward or _reaches(np.array([text.point[1]]), np.array([3 * text.size]), size).any()):
+                y, reach = pixels(shape.point)[1], 3 * shape.size * density
+                if not (shape.upward or (y + reach > -2 and y - reach < size[1] + 2)):
                     return []
-                return [lettering(text, size, halo=halo) for halo in (True, False) if shape.halo or not halo]
+                halos = (True, False) if shape.halo else (False,)
+                return [lettering(shape, size, halo, density, corner) for halo in halos]
             case _:
                 return []
 
@@ -463,7 +541,9 @@ class Sheet:
         if not len(pieces):
             return coverage.NO_STROKES
         pieces = replace(pieces, starts=pieces.starts - corner, ends=pieces.ends - corner)
-        found = coverage.strokes(pieces, self.halves[pieces.owners].astype(float), size, hidden)
+        found = coverage.strokes(
+            pieces, self.halves[pieces.owners].astype(float), self._extent(pieces.owners, size), hidden
+        )
         return replace(found, pixels=self._on_page(found.pixels, found.owners))
 
 
@@ -482,13 +562,21 @@ def _reach(shape: Shape) -> list[tuple[Point, Point]]:
             raise TypeError(f"no shape that is drawn singly: {shape}")
 
 
+def _is_straight(points: Sequence[Point]) -> bool:
+    """Whether a line runs along an axis."""
+    if len(points) != 2:
+        return False
+    (x0, y0), (x1, y1) = points
+    return (x0 == x1) != (y0 == y1)
+
+
 def _between(places: IntArray, table: FloatArray, low: int, high: int) -> tuple[IntArray, FloatArray]:
     """The rows of shapes ``low`` to ``high``."""
     some = slice(*np.searchsorted(places, (low, high)))
     return places[some], table[some]
 
 
-def _reaches(rows: FloatArray, reach: FloatArray, size: Size) -> BoolArray:
+def _reaches(rows: FloatArray, reach: FloatArray, size: Extent) -> BoolArray:
     """Which may reach into the picture, from the row that they are in."""
     result: BoolArray = (rows + reach > -2) & (rows - reach < size[1] + 2)
     return result
