@@ -14,6 +14,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from neurovis_renderers.animated_svg import AnimatedSvgRenderer
+from neurovis_renderers.canvas import paint
+from neurovis_renderers.frames import frames
 from PIL import Image
 from scenes import file_of, film_of, scene_of
 from test_scene_thinned import ENTRY, network_of
@@ -22,7 +25,7 @@ import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.layout import Layout
 from neurovis_spec.live.view import view_of
-from neurovis_spec.scene import Arrowhead, Disc, Group, Scene, Spline, Text, shown
+from neurovis_spec.scene import Arrowhead, Disc, Film, Group, Scene, Spline, Text, shown, still
 from neurovis_spec.scene.renderers import renderer_for
 from neurovis_spec.scene.themes import channels
 
@@ -241,3 +244,82 @@ def test_the_live_page_gets_them(layers: CompiledNetwork) -> None:
     found = [group for group in content["groups"] if "pathway" in group["data"]]
     assert sorted(group["id"] for group in found) == ["bundle:A -> B", "bundle:B -> A", "bundle:B -> B"]
     assert all(group["title"].split("\n")[0].endswith(f" · {int(group['data']['count']):,}") for group in found)
+
+
+#: Two layers of neurons that stay where they are, so that each step adds as much to weights as any other.
+GROWING = """
+neurovis: 1
+name: growing
+time: {steps: 21}
+neurons: {A: {count: 6, bias: 3, activation: tanh}, B: {count: 8, bias: 3, activation: tanh}}
+connections:
+  A -> B: {pattern: all_to_all, weight: WEIGHT, delay: 2, plasticity: {hebbian: {rate: RATE}}}
+layout: {engine: grid}
+render: {theme: THEME}
+"""
+
+
+def growing(weight: float, rate: float, theme: str = "default") -> tuple[Film, list[float]]:
+    """A film of every fifth step, and the sum of what is left out at each."""
+    text = GROWING.replace("WEIGHT", str(weight)).replace("RATE", str(rate)).replace("THEME", theme)
+    network = nv.compile_text(text)
+    steps, recording = range(0, 21, 5), network.run(21)
+    made = film_of(network, [recording.snapshot(step) for step in steps])
+    (bundle,) = bundles_of(made.scene).values()
+    drawn = [int(group.id[1:]) for group in made.scene.groups if re.fullmatch(r"c\d+", group.id)]
+    assert int(bundle.data["count"]) == 48 - len(drawn)
+    left = [np.delete(recording.snapshot(step).weights, drawn).sum() for step in steps]
+    return made, [abs(float(total)) for total in left]
+
+
+def band_of(scene: Scene) -> tuple[Spline, Arrowhead]:
+    (bundle,) = bundles_of(scene).values()
+    line, head = bundle.shapes
+    assert isinstance(line, Spline)
+    assert isinstance(head, Arrowhead)
+    return line, head
+
+
+@pytest.mark.parametrize(
+    ("weight", "rate", "theme"), [(0.25, 0.02, "default"), (-0.8, 0.06, "dark")], ids=["arrow", "bar"]
+)
+def test_in_a_film_a_bundle_is_as_wide_as_its_sum_is_by_then(weight: float, rate: float, theme: str) -> None:
+    """As the root of it; its colour stays, and its head goes with it."""
+    made, sums = growing(weight, rate, theme)
+    bands = [band_of(still(made, frame)) for frame in range(made.frames)]
+    assert bands[0] == band_of(made.scene)
+    first, last = bands[0][0].width, bands[-1][0].width
+    assert abs(last - first) > 0.25 * first
+    for (line, head), total in zip(bands, sums, strict=True):
+        assert line.width == pytest.approx(first * math.sqrt(total / sums[0]), rel=1e-6)
+        assert (line.stroke, head.kind) == (bands[0][0].stroke, bands[0][1].kind)
+        assert head.half_width > line.width / 2
+    ink = np.array(channels(bands[0][0].stroke))
+    for frame, picture in enumerate(frames(made)):
+        pictures = picture, paint(still(made, frame))
+        seen, whole = (int((np.abs(pixels - ink) <= 2).all(axis=2).sum()) for pixels in pictures)
+        assert seen == pytest.approx(whole, rel=0.01)
+
+
+def test_an_animated_svg_has_the_widths_of_its_bundles() -> None:
+    made, _ = growing(0.25, 0.02)
+    svg = AnimatedSvgRenderer().animate(made, ".svg").decode()
+    (said,) = re.findall(r'<g class="band (w\d+)">.*?values="([^"]*)"', svg)
+    widths = {name: float(width) for name, width in re.findall(r"\.(w\d+)\{--w:([\d.]+)\}", svg)}
+    tokens = [token.removeprefix("band ") for token in said[1].split(";")]
+    assert tokens[0] == said[0]
+    assert [widths[token] for token in tokens] == pytest.approx(made.band_widths[:, 0].tolist(), abs=0.04)
+
+
+def test_a_bundle_grows_to_twice_the_widest_and_not_on() -> None:
+    made, sums = growing(0.02, 0.5)
+    assert sums[-1] > 100 * sums[0]
+    assert made.band_widths.max() == pytest.approx(2 * made.band_widths[0, 0])
+
+
+def test_bundles_of_what_does_not_learn_stay_as_they_are(layers: CompiledNetwork) -> None:
+    recording = layers.run(3)
+    made = film_of(layers, [recording.snapshot(step) for step in range(3)])
+    assert {name for name, _ in made.bands} <= {"bundle:B -> A"}
+    still_ = film_of(layers, [recording.snapshot(0)])
+    assert still_.bands == ()

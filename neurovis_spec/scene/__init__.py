@@ -7,6 +7,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.progress import Progress
 from neurovis_spec.scene.film import filled_shape, part, still
 from neurovis_spec.scene.model import (
+    ENDS_OF,
     HALO,
     HEAD_MORE,
     HEAD_OF_LENGTH,
@@ -37,6 +38,7 @@ from neurovis_spec.scene.texts import FAMILIES, SUBSCRIPT_DROP, SUBSCRIPT_SIZE
 from neurovis_spec.scene.themes import THEMES, blend, channels, colours, readable
 
 __all__ = [
+    "ENDS_OF",
     "FAMILIES",
     "HALO",
     "HEAD_MORE",

@@ -15,10 +15,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
 from neurovis_spec.scene import texts
+from neurovis_spec.scene.ends import EndArray
 from neurovis_spec.scene.geometry import samples
 from neurovis_spec.scene.hubs import Hub, hubs_of
 from neurovis_spec.scene.lesions import FAINT
@@ -41,6 +42,8 @@ _BETWEEN = 0.6
 _BEND, _BESIDE = 0.14, 1.5
 #: How far a loop reaches from its hub, and how wide it opens.
 _LOOP, _OPEN = 58.0, 0.55
+#: No band gets wider in a film than so many times the widest at its beginning.
+_MOST_GROWN = 2.0
 #: Discs beside which gaps and heads of lines are as those of bands.
 _USUAL = 20.0
 #: What a strand does, as data.
@@ -280,6 +283,43 @@ def _said(name: str, one: Pathway, step: int, lost: int) -> str:
     delays = [] if high == low == 1 else [f"delay {low}" if low == high else f"delay {low} … {high}"]
     lesioned = [f"{lost:,} of them lesioned"] if lost else []
     return "\n".join([f"{name.replace('->', '→')} · {one.count:,}", *strands, *lesioned, *one.rules, *delays])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Following:
+    """Bands whose width follows their sum: the id of the group of each, which of its shapes it is, which connections
+    its bundle has, and how they end that are added up in it."""
+
+    names: tuple[tuple[str, int], ...]
+    members: tuple[IntArray, ...]
+    ends: tuple[int, ...]
+    widths: Widths
+
+    def at(self, weights: FloatArray, ends: EndArray) -> list[float]:
+        """How wide each is where the weights of all connections, and how these end, are so (m,)."""
+        result = []
+        for members, end in zip(self.members, self.ends, strict=True):
+            with np.errstate(over="ignore", invalid="ignore"):
+                total = float(weights[members[ends[members] == end]].sum())
+            result.append(min(self.widths.at(total), _MOST_GROWN * self.widths.widest))
+        return result
+
+
+def following(network: Network, left: Mapping[str, Pathway], changing: IntArray, unit: float) -> Following:
+    """The bands of which some weights may change, those of the connections ``changing``; ``left`` are the pathways of
+    bundles by the ids of their groups, a page unit is so many user units."""
+    joined = {name: one for name, one in left.items() if not is_lone(network, one)}
+    widest, narrowest, most = widths(list(left.values()), len(joined))
+    may = np.zeros(len(network.connections), np.bool_)
+    may[changing] = True
+    found = [
+        ((name, 2 * place), one.members, strand.end)
+        for name, one in joined.items()
+        if may[one.members].any()
+        for place, strand in enumerate(one.strands)
+    ]
+    names, members, ends = tuple(zip(*found, strict=True)) if found else ((), (), ())
+    return Following(names, members, ends, Widths(unit * widest, unit * narrowest, most))
 
 
 class Told(NamedTuple):

@@ -6,7 +6,7 @@ of one frame; ``scene_of_step``, that of one alone.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
+from neurovis_spec.scene import bundles
 from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.encode import CAPTION, Looks, lesions_by_id, looks, paint, tooltips
@@ -24,6 +26,7 @@ from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gathered_layout import standing
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import (
+    ENDS_OF,
     Arrowhead,
     Disc,
     Film,
@@ -100,6 +103,8 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
     fill_values, line_values = np.empty((frames, neurons)), np.empty((frames, connections))
     widths, glows = np.empty((2, frames, connections))
     ends = np.empty((frames, connections), np.int8)
+    following = bundles.following(network, planned.left, _changing(drawn), planned.unit)
+    band_widths = np.empty((frames, len(following.names)))
     captions, titles, steps, low, high = list[str](), list[str](), list[int](), None, None
     for frame, step in enumerate(snapshots):
         snapshot = drawn.snapshot(step)
@@ -107,6 +112,7 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
         seen = looks(network, snapshot, gains, planned.frame.widest, drawn.signals(step), own_ends)
         fill_values[frame], line_values[frame] = seen.discs, seen.lines
         widths[frame], glows[frame], ends[frame] = seen.widths, seen.glows, seen.ends
+        band_widths[frame] = following.at(snapshot.weights, own_ends)
         steps.append(snapshot.step)
         words = caption(whole, step.step, step.activity)
         shape = planned.caption_shape(words)
@@ -120,9 +126,13 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
     glowing: npt.NDArray[np.bool_] = glows.max(axis=0) > 0
     first = Looks(fill_values[0], line_values[0], widths[0], glows[0], ends[0])
     tips = tooltips(network, gains, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
+    scene = paint(planned, first, glowing, captions[0], tips, steps[0])
+    bands, band_widths = _followed(scene, following.names, band_widths)
+    begun = dict(zip(bands, band_widths[0].tolist(), strict=True))
     return Film(
         scene=replace(
-            paint(planned, first, glowing, captions[0], tips, steps[0]),
+            scene,
+            groups=tuple(widened(group, begun) for group in scene.groups) if begun else scene.groups,
             told=told(drawn, low[1], high[1], ends, steps[-1]),
         ),
         fps=fps,
@@ -136,6 +146,8 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
         caption=CAPTION,
         captions=tuple(captions),
         titles=tuple(titles),
+        bands=bands,
+        band_widths=band_widths,
         faint={
             name: next(frame for frame, step in enumerate(steps) if step >= since)
             for name, since in lesions_by_id(planned).items()
@@ -143,6 +155,33 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
         },
         faintness=FAINT,
     )
+
+
+def _changing(drawn: Gathered) -> IntArray:
+    """The lines whose weight can change in a run."""
+    lines = np.unique(drawn.bundle[drawn.whole.changing])
+    return lines[lines >= 0]
+
+
+def _followed(
+    scene: Scene, names: tuple[tuple[str, int], ...], widths: FloatArray
+) -> tuple[tuple[tuple[str, int], ...], FloatArray]:
+    """Of bands with these widths (frames, bands) those that are not as wide all the time as the scene has them."""
+    groups = {group.id: group for group in scene.groups} if names else {}
+    shapes = [groups[name].shapes[place] for name, place in names]
+    drawn = np.array([shape.width if isinstance(shape, Spline) else np.nan for shape in shapes])
+    some = np.flatnonzero(~np.isclose(widths, drawn, rtol=1e-9, atol=0).all(axis=0))
+    return tuple(names[number] for number in some.tolist()), widths[:, some]
+
+
+def widened(group: Group, bands: Mapping[tuple[str, int], float]) -> Group:
+    """A group whose ``bands``, by its id and their place among its shapes, have these widths, and their heads."""
+    shapes = list(group.shapes)
+    for place, shape in enumerate(group.shapes[:-1]):
+        width, head = bands.get((group.id, place)), shapes[place + 1]
+        if width is not None and isinstance(shape, Spline) and isinstance(head, Arrowhead):
+            shapes[place : place + 2] = replace(shape, width=width), ended(head, width, head.fill, ENDS_OF[head.kind])
+    return replace(group, shapes=tuple(shapes)) if len(shapes) > 1 else group
 
 
 def filled_shape(group: Group) -> int | None:
@@ -155,6 +194,8 @@ def still(film: Film, frame: int) -> Scene:
     """One frame as a scene; a connection that does not glow in it has no glow. Raises IndexError beyond the end."""
     theme = film.scene.theme
     fills = dict(zip(film.fills, colours(theme, film.fill_values[frame]), strict=True))
+    bands = dict(zip(film.bands, film.band_widths[frame].tolist(), strict=True)) if film.bands else {}
+    banded = {name for name, _ in bands}
     shifts: dict[str, Point] = {}
     if film.shifts:
         shifts = {name: (x, y) for name, (x, y) in zip(film.shifts, film.shift_values[frame].tolist(), strict=True)}
@@ -173,6 +214,8 @@ def still(film: Film, frame: int) -> Scene:
     def repaint(group: Group) -> Group:
         if group.id in film.redrawn:
             return replace(group, shapes=film.redrawn[group.id](frame))
+        if group.id in banded:
+            return widened(group, bands)
         shapes: list[Shape] = []
         filled = filled_shape(group) if group.id in fills else None
         for place, shape in enumerate(group.shapes):
@@ -209,6 +252,7 @@ def part(film: Film, names: Collection[str]) -> Film:
         [number for number, name in enumerate(every) if name in names]
         for every in (film.fills, film.lines, film.shifts)
     )
+    bands = [number for number, (name, _) in enumerate(film.bands) if name in names]
     return replace(
         film,
         scene=scene,
@@ -219,6 +263,8 @@ def part(film: Film, names: Collection[str]) -> Film:
         line_widths=film.line_widths[:, lines],
         glow_widths=film.glow_widths[:, lines],
         line_ends=film.line_ends[:, lines],
+        bands=tuple(film.bands[number] for number in bands),
+        band_widths=film.band_widths[:, bands],
         shifts=tuple(film.shifts[number] for number in shifts),
         shift_values=film.shift_values[:, shifts] if shifts else film.shift_values[:, :0],
         redrawn={name: shapes for name, shapes in film.redrawn.items() if name in names},

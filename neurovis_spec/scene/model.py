@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from types import MappingProxyType
 from typing import BinaryIO, ClassVar, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -131,6 +132,10 @@ HEAD_OF_LENGTH, HEAD_OF_WIDTH, HEAD_MORE = 0.3, 0.6, 0.6
 def head_half_width(width: float, length: float) -> float:
     """Half the width of the head on a line of this width: it grows slower than the line, but always covers its end."""
     return max(HEAD_OF_LENGTH * length + HEAD_OF_WIDTH * width, 0.5 / Arrowhead.NOTCH * width + HEAD_MORE)
+
+
+#: By what a line ends in how a Film has it.
+ENDS_OF: Mapping[str, int] = MappingProxyType({"arrow": 1, "bar": -1, "none": 0})
 
 
 def ended(head: Arrowhead, width: float, fill: str, end: int) -> Arrowhead:
@@ -288,7 +293,9 @@ class Film:
     ``glow_widths[f, j]`` (0 for none; a group that glows at any time has a glow in ``scene``, of width 0 where it
     does not glow in frame 0). It ends in an arrow where ``line_ends[f, j]`` is 1, in a bar where that is −1, and in
     neither where it is 0. Group ``shifts[k]`` is moved from where it stands in ``scene`` by ``shift_values[f, k]`` (x
-    and y, user units; 0 in frame 0). A group may be in one of the three at most. A group ``redrawn`` (an id) is in none
+    and y, user units; 0 in frame 0). Line ``bands[l]`` (the id of its group, and which of its shapes; its head is the
+    next one) keeps its colour and its end, and has the width ``band_widths[f, l]``. A group may be in one of the four
+    at most. A group ``redrawn`` (an id) is in none
     of them: its shapes at frame f are ``redrawn[id](f)``, and nothing that stays as it is stands in front of them. From
     frame ``faint[id]`` on, a group that stands there has the opacity ``faintness``. ``captions[f]`` is the text in
     group ``caption``. Colours are linear in sRGB between the theme's anchors, of NaN that of texts; ``still(f)`` is
@@ -308,6 +315,8 @@ class Film:
     captions: tuple[str, ...]
     shifts: tuple[str, ...] = ()
     shift_values: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 2)))
+    bands: tuple[tuple[str, int], ...] = ()
+    band_widths: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     faint: Mapping[str, int] = field(default_factory=dict)
     faintness: float = 1.0
     redrawn: Mapping[str, Redrawn] = field(default_factory=dict)

@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from neurovis_renderers.svg import document, element, escape, num, open_group, pairs, unchanging
 from neurovis_spec.scene import (
+    ENDS_OF,
     HEAD_MORE,
     HEAD_OF_LENGTH,
     HEAD_OF_WIDTH,
@@ -59,6 +60,8 @@ _FAINT, _SHIFTED, _FIXED = "lesioned", "shifted", "fixed"
 _MOVING, _STANDING = "moving", "standing"
 #: Groups that have the class of a colour.
 _COLOURED = f"[class]:not(.{_SHIFTED},.{_MOVING},.{_STANDING})"
+#: The class of a line of a bundle.
+_BAND = "band"
 #: The class of a line that ends otherwise at the moment than in an arrow, where it does not always.
 _OTHERWISE = {-1: "less", 0: "nil"}
 #: What the parts are of a head that ends in several ways.
@@ -96,8 +99,10 @@ class _Writer:
         self._fills = {name: place for place, name in enumerate(film.fills)}
         self._shifts = {name: place for place, name in enumerate(film.shifts)}
         self._lines = {name: place for place, name in enumerate(film.lines)}
+        self._bands = {name: place for place, name in enumerate(film.bands)}
+        self._banded = {name for name, _ in film.bands}
         self._changing = film.changing
-        self._width_step = _step(film.line_widths)
+        self._width_step = max(_step(film.line_widths), _step(film.band_widths))
         self._glow_step = _step(film.glow_widths)
         self._letters: set[int] = set()
         self._widths: set[int] = set()
@@ -119,6 +124,8 @@ class _Writer:
             return self._connection(group, self._lines[group.id])
         if group.id in self._film.redrawn:
             return self._redrawn(group)
+        if group.id in self._banded:
+            return self._bundle(group)
         return unchanging(group, _class(_FIXED))
 
     def _letter(self, level: int) -> str:
@@ -140,6 +147,24 @@ class _Writer:
                 ]
                 self._turning.update(ends)
         return self._animated(group, tokens)
+
+    def _bundle(self, group: Group) -> str:
+        """A group of lines that keep their colours and change their widths, each with its head for itself."""
+        shapes, content, place = group.shapes, "", 0
+        while place < len(shapes):
+            shape, head = shapes[place], shapes[min(place + 1, len(shapes) - 1)]
+            number = self._bands.get((group.id, place))
+            if number is None or not isinstance(head, Arrowhead):
+                content += element(shape, _class(_FIXED))
+                place += 1
+                continue
+            levels = np.rint(self._film.band_widths[:, number] / self._width_step).astype(int).tolist()
+            self._widths.update(levels)
+            tokens = [f"{_BAND} w{level}" for level in levels]
+            drawn = element(shape, _class(_FIXED)) + self._head_element(head, np.array([ENDS_OF[head.kind]]), True)
+            content += f"<g{_class(tokens[0])}>{drawn}{animation(tokens, self._film.frames / self._film.fps)}</g>"
+            place += 2
+        return f"{open_group(group)}{content}</g>\n"
 
     def _animated(self, group: Group, tokens: Sequence[str]) -> str:
         since = self._film.faint.get(group.id)
@@ -182,9 +207,10 @@ class _Writer:
         self._redraws = True
         return f"{open_group(group)}<g{_class(_MOVING)}>{moving}</g><g{_shown(_STANDING, False)}>{standing}</g></g>\n"
 
-    def _head_element(self, head: Arrowhead, ends: npt.NDArray[np.int8]) -> str:
+    def _head_element(self, head: Arrowhead, ends: npt.NDArray[np.int8], fixed: bool = False) -> str:
         """A head in its own coordinates, so that its width alone can be scaled: at the tip, pointing right. One that
-        is now a bar and now an arrow has both, of which the one that it is not at the moment is not displayed."""
+        is now a bar and now an arrow has both, of which the one that it is not at the moment is not displayed. One that
+        is ``fixed`` keeps its colour."""
         (x, y), (dx, dy) = head.tip, head.direction
         place = f"matrix({dx:.4g} {dy:.4g} {-dy:.4g} {dx:.4g} {num(x)} {num(y)})"
         every = {1, *ends.tolist()} if len(set(ends.tolist())) > 1 else {ends[0].item()}
@@ -193,20 +219,21 @@ class _Writer:
             half = head_half_width(head.width, head.length)
         back, whole = -head.BAR * head.length, replace(head, half_width=half)
         if 1 in every:
-            shown = _shown("arrow", head.kind == "arrow") if both else ""
+            shown = _shown("arrow", head.kind == "arrow") if both else _class(_FIXED) if fixed else ""
             inner += self._part(replace(whole, kind="arrow").corners, whole, shown)
         if -1 in every:
-            across = self._part(((0.0, half), (back, half), (back, -half), (0.0, -half)), whole)
-            inner += f"<g{_shown('bar', head.kind == 'bar')}>{self._stem(head, back)}{across}</g>"
+            shown, corners = _class(_FIXED) if fixed else "", ((0.0, half), (back, half), (back, -half), (0.0, -half))
+            across = self._part(corners, whole, shown)
+            inner += f"<g{_shown('bar', head.kind == 'bar')}>{self._stem(head, back, fixed)}{across}</g>"
         if 0 in every:
-            inner += f"<g{_shown('none', head.kind == 'none')}>{self._stem(head, 0.0)}</g>"
+            inner += f"<g{_shown('none', head.kind == 'none')}>{self._stem(head, 0.0, fixed)}</g>"
         return f'<g{_class("both") if both else ""} transform="{place}">{inner}</g>'
 
-    def _stem(self, head: Arrowhead, end: float) -> str:
+    def _stem(self, head: Arrowhead, end: float, fixed: bool) -> str:
         """What leads a line on, as wide as this, from the notch of its head."""
         start = -(head.NOTCH + head.LAP) * head.length
         path = f'<path class="stem" d="M{num(start)} 0H{num(end)}" stroke="{head.fill}" '
-        return path + f'stroke-width="{num(head.width)}"/>'
+        return path + f'stroke-width="{num(head.width)}"{_kept(head.fill) if fixed else ""}/>'
 
     def _part(self, corners: Sequence[Point], head: Arrowhead, attributes: str = "") -> str:
         """What is filled of a head; its style says what its width follows from."""
@@ -300,6 +327,11 @@ def _scoped(rule: str, root: str) -> str:
 
 def _class(token: str) -> str:
     return f' class="{token}"'
+
+
+def _kept(stroke: str) -> str:
+    """A style that goes before the rules by which what is part of a line has its colour."""
+    return f' style="stroke:{stroke}"'
 
 
 def _shown(token: str, shown: bool) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,7 @@ from neurovis_renderers.canvas import COVERED, Pixels, Stack, bands, portions, s
 from neurovis_renderers.coverage import BoolArray, Fragments, Heads, Numbers, Size, Strokes
 from neurovis_renderers.sheet import LANE, WHOLE, Sheet, Words, lanes, lanes_of, packed, packed_all
 from neurovis_spec.scene import (
+    ENDS_OF,
     HEAD_MORE,
     HEAD_OF_LENGTH,
     HEAD_OF_WIDTH,
@@ -66,6 +68,7 @@ class Moving:
         self.apart_places = [where[0] for group, where in places if group.id in names]
         #: how many of what stands apart are redrawn and come last, so that nothing is in front of them
         self.last = next((k for k, group in enumerate(reversed(apart)) if group.id not in film.redrawn), len(apart))
+        self._line_widths, self._line_ends = _with_bands(film)
         self._find_what_changes(names)
         self.bands = [Band(self, top, size) for top, size in bands(film.scene.pixels)]
 
@@ -74,7 +77,8 @@ class Moving:
         film, sheet = self.film, self.sheet
         fill_of = {name: number for number, name in enumerate(film.fills)}
         line_of = {name: number for number, name in enumerate(film.lines)}
-        fills, words, lines, glows, ends = ([(0, 0)][:0] for _ in range(5))
+        fills, words, lines, glows, ends, bands, band_ends = ([(0, 0)][:0] for _ in range(7))
+        band_of = {name: number for number, name in enumerate(film.bands, len(film.lines))}
         for group, places in zip(film.scene.groups, sheet.places, strict=True):
             if group.id in apart:
                 continue
@@ -95,10 +99,15 @@ class Moving:
                             lines.append((place, number))
                         case Arrowhead():
                             ends.append((place, number))
-        self._fills, self._words, self._lines, self._glows, self._ends = (
-            np.array(pairs, np.int64).reshape(-1, 2).T for pairs in (fills, words, lines, glows, ends)
+            for number, (place, head) in enumerate(pairwise(places)) if band_of else ():
+                if (group.id, number) in band_of:
+                    bands.append((place, band_of[group.id, number]))
+                    band_ends.append((head, band_of[group.id, number]))
+        self._fills, self._words, self._lines, self._glows, self._ends, self._wide, self._headed = (
+            np.array(pairs, np.int64).reshape(-1, 2).T
+            for pairs in (fills, words, lines, glows, ends, [*lines, *bands], [*ends, *band_ends])
         )
-        self._lengths = sheet.head_lengths[self._ends[0]] / film.scene.density
+        self._lengths = sheet.head_lengths[self._headed[0]] / film.scene.density
         #: which shapes get another colour, or another width, at any time
         self.coloured = np.zeros(len(sheet), bool)
         for values, parts in ((film.fill_values, (fills, words)), (film.line_values, (lines, ends))):
@@ -106,23 +115,24 @@ class Moving:
             for place, number in (pair for pairs in parts for pair in pairs):
                 self.coloured[place] = turns[number]
         #: half widths and stems, at least and at most
-        self.least = self._halves(film.line_widths.min(axis=0), film.glow_widths.min(axis=0), film.line_ends[0])
-        turned = (film.line_ends != film.line_ends[:1]).any(axis=0)
-        wide = np.where(turned & (film.line_ends[0] == 0), np.int8(-1), film.line_ends[0])  # as it is when it is a head
-        self.most = self._halves(film.line_widths.max(axis=0), film.glow_widths.max(axis=0), wide)
+        widths, line_ends = self._line_widths, self._line_ends
+        self.least = self._halves(widths.min(axis=0), film.glow_widths.min(axis=0), line_ends[0])
+        turned = (line_ends != line_ends[:1]).any(axis=0)
+        wide = np.where(turned & (line_ends[0] == 0), np.int8(-1), line_ends[0])  # as it is when it is a head
+        self.most = self._halves(widths.max(axis=0), film.glow_widths.max(axis=0), wide)
         self.shaped = self.least[0] != self.most[0]
-        heads, whose = self._ends
+        heads, whose = self._headed
         turning = heads[turned[whose]]
         self.shaped[turning] = True
         self.least[0][turning] = 0  # what is now an arrow and now something else hides nothing for certain
         self.least[1][turning] = -1
 
     def _halves(self, widths: FloatArray, glows: FloatArray, line_ends: _Ends) -> tuple[Numbers, Numbers]:
-        """Half the width of every line, glow and head in pixels, by place, of lines of such widths (in user units); and
-        of the stem of what ends in no arrow, −1 elsewhere."""
+        """Half the width of every line, band, glow and head in pixels, by place, where lines and then bands have such
+        widths (in user units); and of the stem of what ends in no arrow, −1 elsewhere."""
         density = self.film.scene.density
         halves: Numbers = self.sheet.halves + self.sheet.head_halves
-        (lines, which), (shining, whose), (ends, of) = self._lines, self._glows, self._ends
+        (lines, which), (shining, whose), (ends, of) = self._wide, self._glows, self._headed
         halves[lines] = widths[which] * (density / 2)
         halves[shining] = glows[whose] * (density / 2)
         wide, long = widths[of], self._lengths
@@ -137,7 +147,7 @@ class Moving:
 
     def halves(self, frame: int) -> tuple[Numbers, Numbers]:
         """Half the width of every line, glow and head at a frame, by place, and of the stems."""
-        return self._halves(self.film.line_widths[frame], self.film.glow_widths[frame], self.film.line_ends[frame])
+        return self._halves(self._line_widths[frame], self.film.glow_widths[frame], self._line_ends[frame])
 
     def colours(self, frame: int) -> IntArray:
         """The colours of all shapes at a frame, by place."""
@@ -148,6 +158,18 @@ class Moving:
             result[places] = colours[which]
         result[self._words[0]] = [_readable(self.theme, fill) for fill in fills[self._words[1]].tolist()]
         return result
+
+
+def _with_bands(film: Film) -> tuple[FloatArray, _Ends]:
+    """How wide lines and then bands are, and how they end, (frames, lines and bands)."""
+    if not film.bands:
+        return film.line_widths, film.line_ends
+    groups = {group.id: group.shapes for group in film.scene.groups}
+    heads = [groups[name][place + 1] for name, place in film.bands]
+    ends = np.array([ENDS_OF[head.kind] for head in heads if isinstance(head, Arrowhead)], np.int8)
+    every = np.broadcast_to(ends, (film.frames, len(ends)))
+    widths = np.concatenate([film.line_widths, film.band_widths], axis=1)
+    return widths, np.concatenate([film.line_ends, every], axis=1)
 
 
 def _stands_apart(film: Film, group: Group) -> bool:
