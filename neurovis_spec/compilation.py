@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 from weakref import WeakKeyDictionary
 
 from neurovis_spec.compiler.compile import Request
@@ -116,6 +116,15 @@ class Compilation:
             make = partial(self.arranged, engine, effort, size=size)
             self._layouts[key] = kept(self._asked(effort, size), engine or self.network.layout.engine, make)
         return self._layouts[key]
+
+    def of_size(self, size: tuple[int, int] | None) -> Self:
+        """The same as though the spec asked for pictures of this size (``render: size``), or for none; the gains and
+        the layouts that are known of it are known of both."""
+        network = self.network
+        made = replace(self, network=replace(network, render=replace(network.render, size=size)))
+        shared = {"_layouts": self._layouts, "_recorded": self._recorded}
+        made.__dict__.update({**shared, **({"gains": self.gains} if self.measured else {})})
+        return made
 
     def settings_for(self, theme: str | None) -> RenderSettings:
         """How it is drawn, in a theme of this name. Raises RendererError for one that there is not."""

@@ -52,6 +52,7 @@ def test_every_message_and_limit_is_documented() -> None:
         "placed",
         "saving",
         "making",
+        "fitting",
         "body",
         "measured",
         "undefined",

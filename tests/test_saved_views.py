@@ -173,7 +173,7 @@ def test_a_page_sends_all_of_a_view_and_is_told_all_of_them() -> None:
     assert command_of(message(**dict.fromkeys(view))) == Keep("a b", SavedView())
     assert command_of('{"type": "unkeep", "name": "a  b"}') == Unkeep("a  b")
     assert command_of('{"type": "rekeep", "name": "a  b", "to": " c  d"}') == Rekeep("a  b", "c d")
-    assert json.loads(views_message("x", {"a": wanted}, ""))["views"] == {"a": view}
+    assert json.loads(views_message("x", {"a": wanted}, ""))["views"] == {"a": {**view, "window": None}}
     for wrong in (
         {"step": -1}, {"speed": "3"}, {"camera": [0, 1, 2]}, {"camera": [1, 2]}, {"curves": [3]}, {"theme": "x"},
         {"closed": "a"}, {"shows": "body"}, {"more": 1}, {"camera": [1, 2, 1e301]}, {"curves": ["x"] * 2000},

@@ -13,6 +13,7 @@ from typing import Final, Literal, TypeAlias
 from neurovis_spec.layout.model import Point
 from neurovis_spec.live.saved_views import SavedView
 from neurovis_spec.live.turns import Turn
+from neurovis_spec.live.windows import Window
 from neurovis_spec.scene.gains import Gains, Scale
 
 #: Gains become at most so many times as large, or as small.
@@ -254,6 +255,13 @@ class Rekeep:
     to: str
 
 
-Request: TypeAlias = PlaceNeuron | Unplace | Save | Write | Fetch | Keep | Unkeep | Rekeep
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Lay the network out for a window of this shape, where that shows it larger."""
+
+    window: Window
+
+
+Request: TypeAlias = PlaceNeuron | Unplace | Save | Write | Fetch | Keep | Unkeep | Rekeep | Fit
 #: the messages that ask for them
-REQUESTS: Final = frozenset(("place", "unplace", "save", "write", "fetch", "keep", "unkeep", "rekeep"))
+REQUESTS: Final = frozenset(("place", "unplace", "save", "write", "fetch", "keep", "unkeep", "rekeep", "fit"))

@@ -6,10 +6,11 @@ looks on waits for it. While a neuron is dragged the latest place counts alone.
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Condition, RLock, Thread
@@ -22,6 +23,7 @@ from neurovis_spec.live.commands import (
     STILLS,
     Appearance,
     Fetch,
+    Fit,
     Keep,
     PlaceNeuron,
     Rekeep,
@@ -34,6 +36,7 @@ from neurovis_spec.live.commands import (
 from neurovis_spec.live.pins import Compile, File, Placed, Saving, SavingError, placed, saving
 from neurovis_spec.live.protocol import (
     file_message,
+    fitting_message,
     making_message,
     moved_message,
     placed_message,
@@ -48,9 +51,11 @@ from neurovis_spec.live.source import Source, SourceError
 from neurovis_spec.live.turns import Turned
 from neurovis_spec.live.view import View
 from neurovis_spec.live.watch import Watch
+from neurovis_spec.live.windows import Window
 from neurovis_spec.live.with_events import WithEvents, with_events
 from neurovis_spec.progress import Progress
 
+_LOG: Final = logging.getLogger(__name__)
 _Had = TypeVar("_Had")
 #: Tells who has asked.
 Answer: TypeAlias = Callable[[str | bytes], None]
@@ -62,6 +67,15 @@ _UNDONE: Final = 200
 _PATIENCE: Final = 30.0
 #: Seconds between two words of how far a film is.
 _OFTEN: Final = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """What was laid out for a window, in place of what, and how it is drawn, where it is otherwise."""
+
+    before: Placed
+    after: Placed
+    view: View | None
 
 
 @dataclass(frozen=True)
@@ -93,7 +107,10 @@ class Desk:
         #: the spec with events that is to be written, and as it was written last
         self._events: WithEvents | None = None
         self._noted: WithEvents | None = None
-        self._asked: deque[tuple[Request, Answer]] = deque()
+        #: the window that the network is wanted for, and whether it is being laid out for one
+        self._window: Window = "default"
+        self._fitting = False
+        self._asked: deque[tuple[Request | _Fitted, Answer]] = deque()
         self._wake, self._work_lock = Condition(), RLock()
         self._ended = False
         self._thread = Thread(target=self._work, name="live desk", daemon=True)
@@ -125,7 +142,12 @@ class Desk:
             if len(self._asked) >= _WAITING:
                 answer(refused_message("too much is asked at once"))
                 return
-            self._asked.append((request, answer))
+            self._put(request, answer)
+
+    def _put(self, request: Request | _Fitted, answer: Answer | None = None) -> None:
+        """Have this carried out after all that was asked."""
+        with self._wake:
+            self._asked.append((request, answer or _nobody))
             self._wake.notify()
 
     @property
@@ -133,18 +155,19 @@ class Desk:
         """What is put by hand."""
         return self._placed
 
-    def renew(self, compiled: Compilation) -> Layout:
-        """The layout of an edited network, with what was put by hand. Raises LayoutRefusalError."""
+    def renew(self, compiled: Compilation) -> Placed:
+        """An edited network as it is laid out, with what was put by hand. Raises LayoutRefusalError."""
         with self._work_lock:
-            self._earlier, self._placed = self._placed, self._placed.carried(compiled)
+            self._earlier, self._placed = self._placed, self._placed.carried(compiled, self._window)
             self._forget()
-            return self._placed.layout
+            return self._placed
 
     def unrenew(self) -> None:
         """What was put by hand is what it was before ``renew``, as the edited network is not shown after all."""
         with self._work_lock:
             self._placed = self._earlier
             self._forget()
+            self._fit()
 
     def _forget(self) -> None:
         """Another network: nothing of the one before can be undone or written."""
@@ -168,7 +191,7 @@ class Desk:
             except Exception as error:  # an engine, ours or anybody's, may fail: the view goes on
                 answer(refused_message(str(error.args[0] if isinstance(error, KeyError) else error)))
 
-    def _carry_out(self, request: Request, answer: Answer) -> None:
+    def _carry_out(self, request: Request | _Fitted, answer: Answer) -> None:
         match request:
             case PlaceNeuron(done=False):
                 view = self._shown()
@@ -182,6 +205,7 @@ class Desk:
                     raise SavingError("nothing was put by hand")
                 self._placed = self._before.pop()
                 self._show(answer)
+                self._fit()
             case Save(into="events"):
                 self._events, file = self._with_events()
                 self._saving = Saving((file,))
@@ -193,6 +217,11 @@ class Desk:
                 answer(saving_message(names, self._saving.diff, written=False, into=request.into))
             case Write():
                 self._write(answer)
+            case Fit():
+                self._window = request.window
+                self._fit()
+            case _Fitted():
+                self._take(request)
             case Keep():
                 keep(self._views(), request.name, request.view)
                 self._say_views()
@@ -271,7 +300,7 @@ class Desk:
             answer(saving_message(files, "", written=True, into="events"))
             return
         compiled = spec.compile(spec.path.read_text(encoding="utf-8-sig"))
-        self._placed = Placed(compiled, self._placed.engine, self._placed.layout)
+        self._placed = self._placed.written(compiled)
         self._before.clear()
         self._say()
         answer(saving_message(files, "", written=True))
@@ -283,18 +312,49 @@ class Desk:
             self._view = self._draw(self._placed.compiled, wanted, self._placed.layout)
         return self._view
 
-    def _show(self, answer: Answer) -> None:
-        """Show the layout with the neurons placed by hand, at the current step."""
-        self._view, self._saving = None, None
-        view, shown = self._shown(), self._placed.compiled.hash
+    def _show(self, answer: Answer, view: View | None = None) -> None:
+        """Show the layout with the neurons placed by hand, at the current step, as it may have been drawn before."""
+        self._view, self._saving = view, None
+        drawn, shown = self._shown(), self._placed.compiled.hash
 
         def change(source: Source) -> Stage:
             if source.network.hash != shown:
                 raise SourceError("the spec was edited meanwhile")
-            return source, view
+            return source, drawn
 
         self._run.change(change, lambda reason: answer(refused_message(reason)))
         self._say()
+
+    def _fit(self) -> None:
+        """Have the network laid out for the window, beside the desk, if it is not; what was put by hand stays."""
+        before, window = self._placed, self._window
+        if self._fitting or window == before.window or before.moved or self._before:
+            return
+        self._fitting = True
+
+        def lay_out() -> None:
+            made = _Fitted(before, replace(before, window=window), None)
+            try:
+                after = before.for_window(window)
+                same = after.layout is before.layout
+                view = None if same else self._draw(after.compiled, self._run.appearance, after.layout)
+                made = _Fitted(before, after, view)
+            except Exception as error:  # an engine, ours or anybody's, may fail: the picture stays as it is
+                _LOG.error("the network cannot be laid out for a window", exc_info=error)
+            self._put(made)
+
+        self._tell(fitting_message(window))
+        Thread(target=lay_out, name="live fitting", daemon=True).start()
+
+    def _take(self, made: _Fitted) -> None:
+        """Show the network as it was laid out for a window, if it is the one that is shown."""
+        self._fitting = False
+        if self._placed is made.before and not self._before:
+            self._placed = made.after
+            if made.view is not None:
+                self._show(_nobody, made.view)
+        self._tell(fitting_message(None))
+        self._fit()
 
     def _say_views(self) -> None:
         """Tell everybody which views are saved, where they can be."""
@@ -334,7 +394,11 @@ def _telling(answer: Answer) -> Progress:
     return tell
 
 
-def _replaces(request: Request, before: Request) -> bool:
+def _nobody(text: str | bytes) -> None:
+    """Nobody has asked."""
+
+
+def _replaces(request: Request, before: Request | _Fitted) -> bool:
     """Whether a request makes one that waits superfluous: a neuron is dragged on."""
     if not (isinstance(request, PlaceNeuron) and isinstance(before, PlaceNeuron)):
         return False

@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.live.aside import Compared
-from neurovis_spec.live.commands import Fetch, Measure, Request
+from neurovis_spec.live.commands import Fetch, Fit, Measure, Request
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.held import told_of
 from neurovis_spec.live.history import Bins, History
@@ -518,5 +518,5 @@ class Reception:
             if isinstance(command, Fetch):
                 command = replace(command, theme=self._hub.theme_of(client))
             self._desk.ask(command, lambda text: self._hub.answer(client, text))
-        else:
+        elif not isinstance(command, Fit):  # every page asks for that
             client.tell(refused_message("nothing is put by hand or saved here"))

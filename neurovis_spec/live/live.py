@@ -84,16 +84,16 @@ class Edits:
         before, now = self._desk.placed.compiled, self._now()
         try:
             again = retitled(before, self._spec.path) if now == self._beside else None
-            compiled = again or self._spec.compile()
-            layout = self._desk.renew(compiled)
+            placed = self._desk.renew(again or self._spec.compile())
         except Exception as error:  # a layout engine, ours or anybody's, may fail
             return self._refused(_words(error))
+        compiled = placed.compiled
         try:
             view = self._run.view
-            if again is not None and layout is view.layout:
+            if again is not None and placed.layout is view.layout:
                 change = self._show.retitled(again, view)
             else:
-                change = self._show.changed(compiled, self._run.appearance, layout)
+                change = self._show.changed(compiled, self._run.appearance, placed.layout)
             refused = self._changed(change)
         except Exception as error:  # so may a body
             refused = _words(error)

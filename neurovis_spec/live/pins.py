@@ -22,6 +22,7 @@ from neurovis_spec.language.format.edit import Value, put
 from neurovis_spec.layout.file import dump, name_text, number_text
 from neurovis_spec.layout.model import GRID, Layout, Point
 from neurovis_spec.live.commands import Into
+from neurovis_spec.live.windows import Window, fitted
 from neurovis_spec.runtime.files import replacing
 
 #: Positions by hand are multiples of this (units of the layout).
@@ -43,6 +44,9 @@ class Placed:
     engine: str | None
     layout: Layout
     moved: tuple[str, ...] = ()
+    #: the window that it was asked for, and whether it is laid out for that, not as anywhere
+    window: Window = "default"
+    is_fitted: bool = False
 
     def put(self, neuron: str, at: Point) -> Placed:
         """Put a neuron here; its mirror image follows. Raises LayoutRefusalError where that cannot be drawn, KeyError
@@ -55,17 +59,28 @@ class Placed:
         place = (round(at[0] / STEP) * STEP, round(at[1] / STEP) * STEP)
         return replace(self, layout=self._with(moved, {neuron: place}), moved=moved)
 
-    def carried(self, compiled: Compilation) -> Placed:
-        """The same in an edited network: what is there still stays where it was put. Raises LayoutRefusalError."""
+    def carried(self, compiled: Compilation, window: Window = "default") -> Placed:
+        """The same in an edited network, for a ``window``: what is there still stays where it was put, in the window in
+        which that was. Raises LayoutRefusalError."""
         if compiled.problem is self.compiled.problem:
             return replace(self, compiled=compiled)
-        begun = placed(compiled, self.engine)
         moved = tuple(name for name in self.moved if name in compiled.network.neuron_index)
+        begun = placed(compiled, self.engine, self.window if moved else window)
         if not moved:
             return begun
         return replace(
             begun, layout=begun._with(moved, {name: self.layout.positions[name] for name in moved}), moved=moved
         )
+
+    def written(self, compiled: Compilation) -> Placed:
+        """The same of a spec that says by now what was put by hand."""
+        same = compiled.of_size(self.compiled.network.render.size) if self.is_fitted else compiled
+        return replace(self, compiled=same, moved=())
+
+    def for_window(self, window: Window) -> Placed:
+        """The same, of which nothing was put by hand, for a window. Raises LayoutRefusalError."""
+        plain = self.compiled.of_size(None) if self.is_fitted else self.compiled
+        return placed(plain, self.engine, window)
 
     def _with(self, moved: Sequence[str], places: Mapping[str, Point]) -> Layout:
         """The layout in which some have just been put elsewhere. They are remembered there, as from a layout file that
@@ -83,9 +98,11 @@ class Placed:
         return compiled.arranged(self.engine, earlier=replace(self.layout, positions=positions))
 
 
-def placed(compiled: Compilation, engine: str | None = None) -> Placed:
-    """A network as it is laid out. Raises LayoutRefusalError."""
-    return Placed(compiled, engine, compiled.placed(engine))
+def placed(compiled: Compilation, engine: str | None = None, window: Window = "default") -> Placed:
+    """A network as it is laid out for a window. Raises LayoutRefusalError."""
+    found = fitted(compiled, engine, window)
+    shown, layout = (compiled, compiled.placed(engine)) if found is None else found
+    return Placed(shown, engine, layout, window=window, is_fitted=found is not None)
 
 
 def _images(compiled: Compilation, neuron: int) -> set[int]:

@@ -34,6 +34,7 @@ from neurovis_spec.live.commands import (
     Draw,
     Event,
     Fetch,
+    Fit,
     Forget,
     Into,
     Keep,
@@ -73,6 +74,7 @@ from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, S
 from neurovis_spec.live.typed import LONGEST
 from neurovis_spec.live.undefined import Undefined
 from neurovis_spec.live.view import Glance
+from neurovis_spec.live.windows import Window
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
@@ -313,6 +315,11 @@ def making_message(done: int, total: int) -> str:
     return _text("making", done=done, total=total)
 
 
+def fitting_message(window: Window | None) -> str:
+    """For which window the network is being laid out; None: for none any more."""
+    return _text("fitting", window=window)
+
+
 def refused_message(reason: str) -> str:
     """Why what was asked is not done."""
     return _text("refused", reason=reason)
@@ -480,7 +487,8 @@ def _speed(value: object) -> float:
 
 
 def _view(value: object) -> SavedView:
-    if not isinstance(value, dict) or set(value) != set(SavedView.__slots__):
+    of_view = set(SavedView.__slots__)
+    if not isinstance(value, dict) or not of_view - {"window"} <= set(value) <= of_view:
         raise ProtocolError("all of a view is wanted")
     checks: dict[str, Check] = {
         "step": _whole(0, _MOST),
@@ -490,9 +498,10 @@ def _view(value: object) -> SavedView:
         "theme": _theme,
         "closed": _texts,
         "shows": _one_of(*SHOWN),
+        "window": _window,
     }
     made: Callable[..., SavedView] = SavedView
-    return made(**{name: None if value[name] is None else check(value[name]) for name, check in checks.items()})
+    return made(**{name: None if value.get(name) is None else check(value[name]) for name, check in checks.items()})
 
 
 def _camera(value: object) -> tuple[float, float, float]:
@@ -569,6 +578,9 @@ def _one_of(*texts: str) -> Check:
         return value
 
     return check
+
+
+_window: Final = _one_of(*get_args(Window))
 
 
 def _items(value: object) -> tuple[str, ...]:
@@ -658,6 +670,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "keep": ({"name": _view_name, "view": _view}, Keep),
     "unkeep": ({"name": _name}, Unkeep),
     "rekeep": ({"name": _name, "to": _view_name}, Rekeep),
+    "fit": ({"window": _window}, Fit),
     "fetch": ({"what": _one_of(*get_args(What)), "seconds": _seconds}, Fetch),
 }
 #: Members that a message need not have.

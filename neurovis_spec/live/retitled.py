@@ -18,7 +18,7 @@ from neurovis_spec.language.yaml.source import Mapping
 
 _KEY: Final = "title"
 #: What follows from a compilation, and is the same with another title.
-_FOLLOWS: Final = ("problem", "gains", "_layouts", "_recorded")
+_FOLLOWS: Final = ("gains", "_layouts", "_recorded")
 
 C = TypeVar("C", bound=Compilation)
 
@@ -41,6 +41,7 @@ def retitled(shown: C, path: Path) -> C | None:
     network = replace(shown.network, title=title)
     made = replace(shown, network=network, spec=spec, sources={**shown.sources, name: after})
     made.__dict__.update({key: value for key, value in shown.__dict__.items() if key in _FOLLOWS})
+    made.__dict__["problem"] = shown.problem
     return made
 
 

@@ -359,10 +359,10 @@ class Run:
         if self._source is not source:
             self._loop = None
             self._typed = self._typed.on(self._source.network)
+            self._clock = self._clock_of(self._source, self._clock.speed)
+            self._clock.start(time.perf_counter())
+            self._ended, self._target = False, None
         self._redraw(refuse)
-        self._clock = self._clock_of(self._source, self._clock.speed)
-        self._clock.start(time.perf_counter())
-        self._ended, self._target = False, None
 
     def _play_over(self, asked: Loop) -> None:
         """Play these steps over and over. Raises SourceError for such as cannot be gone to."""

@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, cast, get_args
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings, Span
@@ -30,6 +30,7 @@ from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.curves import series_of
 from neurovis_spec.live.typed import LONGEST
 from neurovis_spec.live.typed import findings as measured
+from neurovis_spec.live.windows import Window
 from neurovis_spec.runtime.files import replacing
 from neurovis_spec.themes import THEMES
 
@@ -39,7 +40,7 @@ FARTHEST: Final = (1 << 53) - 1
 MOST: Final = 1024
 _NEW: Final = f"neurovis_view: {VERSION}\n"
 _KEYS: Final = ("neurovis_view", "views")
-_OF_VIEW: Final = ("step", "speed", "camera", "curves", "theme", "closed", "shows")
+_OF_VIEW: Final = ("step", "speed", "camera", "curves", "theme", "closed", "shows", "window")
 #: What a page can show: views of the network, as ``render`` calls them.
 SHOWN: Final = ("network", "matrix", "pathways")
 #: A line that is neither blank nor a comment.
@@ -53,7 +54,8 @@ class SavedView:
     """Where a page stood: its ``step``, its ``speed`` (a key of ``SPEEDS``), its ``camera`` (how many times as large as
     the whole picture fits into the window; the units of the layout in the middle), its ``curves`` by what they show,
     its ``theme`` ("" is that of the spec), the boxes that are ``closed`` by hand, and what it ``shows`` (one of
-    ``SHOWN``). What is None stays as it is."""
+    ``SHOWN``). What is None stays as it is; ``window`` is that for which the network was laid out, None for none: the
+    camera is of that."""
 
     step: int | None = None
     speed: str | None = None
@@ -62,6 +64,7 @@ class SavedView:
     theme: str | None = None
     closed: tuple[str, ...] | None = None
     shows: str | None = None
+    window: Window | None = None
 
 
 def file_beside(spec: Path) -> Path:
@@ -207,6 +210,7 @@ def _view(name: str, node: Node, known: Callable[[str], bool], findings: Finding
         _one_of(given("theme"), "theme", {"": "", **THEMES}, findings),
         _plain(_texts(given("closed"), "closed", findings)),
         _one_of(given("shows"), "shows", {one: one for one in SHOWN}, findings),
+        cast(Window | None, _one_of(given("window"), "window", dict.fromkeys(get_args(Window)), findings)),
     )
 
 

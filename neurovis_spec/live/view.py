@@ -30,6 +30,7 @@ from neurovis_spec.live.history import Members
 from neurovis_spec.live.source import Mask, Seen
 from neurovis_spec.live.sums import ENDS, SumArray, Sums
 from neurovis_spec.live.weights import ranges_of
+from neurovis_spec.live.windows import window_of
 from neurovis_spec.runtime.quantities import Glyphs, Listed, Quantities
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import Scene, bundles
@@ -293,6 +294,7 @@ def view_of(
     joined, bands = _bundles(planned)
     by_hand = {**declared(compiled), **ranges_of(drawn)}
     more = {**by_hand, **names, **begins, **bands, "themes": list(THEMES), "themed": themed}
+    more["window"] = window_of(compiled)
     words = content(drawn.network, scene, rows, _constants(drawn, planned), more)
     otherwise = otherwise or partial(view_of, compiled, gains, theme, engine, layout=layout)
     dress = partial(_dressed, compiled, gains, appearance, layout, otherwise)

@@ -11,6 +11,7 @@ import { Branches } from './branches.js';
 import { Camera } from './camera.js';
 import { channels, luminance } from './colours.js';
 import { Controls, part } from './controls.js';
+import { Fitting } from './fitting.js';
 import { listKeys } from './keys.js';
 import { Legend } from './legend.js';
 import { Matrix } from './matrix.js';
@@ -135,7 +136,8 @@ const link = new Link({
       return;
     }
     const network = bare(scene),
-      stays = staying(camera, zoom.scene, network);
+      stays = staying(camera, zoom.scene, network),
+      isOther = !first && zoom.scene?.window !== scene.window;
     pointer.cancel();
     zoom.use(network);
     aside.use(network);
@@ -151,6 +153,8 @@ const link = new Link({
     if (first) blank();
     choose(matrix !== null);
     if (!matrix) stays?.();
+    if (isOther) camera.fit();
+    fitting.scene(scene);
     part('titled').textContent = scene.title;
     beside.use(scene);
     part('notes').textContent = scene.groups.find(({ id }) => id === 'notes')?.title ?? '';
@@ -221,6 +225,7 @@ const link = new Link({
       views.measures(message.measures);
       share.status();
       views.status();
+      fitting.status(message);
     } else if (message.type === 'values') attention.take(message);
     else if (message.type === 'body') body.use(message.skeleton, message.start, message.motors);
     else if (message.type === 'findings') controls.found(message);
@@ -236,6 +241,7 @@ const link = new Link({
       measuring.take(message);
       views.measured(message);
     } else if (message.type === 'views') views.take(message);
+    else if (message.type === 'fitting') fitting.told(message.window);
     else if (message.type === 'making') share.making(message.done, message.total);
     else if (message.type === 'refused') {
       share.made();
@@ -248,6 +254,7 @@ const link = new Link({
     part('lost').hidden = open;
     if (open) {
       turning.appearance.dress();
+      fitting.begin();
       attention.ask();
     } else controls.refuse('not connected, trying again …');
   },
@@ -278,7 +285,8 @@ const aside = new Aside(link, part, () => {
 const branches = new Branches(link, part, undo, (number, name) => strips.compare(number, name));
 const measuring = new Measuring(link, strips, part);
 const body = new Body(part('embodied'), part('posed'), part('bodily'), part('spatial'), redraw);
-const share = new Share(link, camera, strips, attention, controls, body, redraw, part, branches, (words) =>
+const fitting = new Fitting(link, part('shown'), part('fitting'));
+const share = new Share(link, camera, strips, attention, controls, body, redraw, part, branches, fitting, (words) =>
   refusal.tell(words),
 );
 const saves = new Saves(link, body, (done, total) => share.making(done, total), part);

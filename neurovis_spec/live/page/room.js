@@ -51,7 +51,8 @@ export function staying(camera, before, after) {
       .map(({ data }) => data.neuron ?? '')
       .join('\n')
       .trim();
-  if (!before || !(before.constants.scale * after.constants.scale) || named(before) !== named(after)) return undefined;
+  if (before?.window !== after.window) return undefined;
+  if (!(before.constants.scale * after.constants.scale) || named(before) !== named(after)) return undefined;
   const scale = camera.scale * before.constants.scale,
     { left, top } = before.constants,
     start = camera.origin.map((at, axis) => at + camera.scale * [left, top][axis]);
@@ -60,6 +61,13 @@ export function staying(camera, before, after) {
       by = scale / constants.scale;
     camera.stand(by, [start[0] - by * constants.left, start[1] - by * constants.top]);
   };
+}
+
+/** Of which shape a window is, by what network and curves have of it: wide where these may stand beside the network, tall
+ * where it has more height than width above them. @param {number} wide @param {number} high */
+export function windowOf(wide, high) {
+  if (wide >= LEAST && wide >= WIDE * high) return 'wide';
+  return wide < high - Math.min(BELOW, HALF * high) ? 'tall' : 'default';
 }
 
 /** How the network and the curves share so much room: whether these stand beside it, and how wide they are then.

@@ -10,6 +10,7 @@ import { pixelsOf } from './save.js';
 /** @typedef {import('./branches.js').Branches} Branches */
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {import('./controls.js').Controls} Controls */
+/** @typedef {import('./fitting.js').Fitting} Fitting */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Scene} Scene */
@@ -26,6 +27,9 @@ const OF = '|',
   JOINED = '+',
   AGAINST = '/';
 
+/** The window of a picture that is laid out as anywhere. */
+export const USUAL = 'default';
+
 /** A finite number of a text, null where it is none. @param {string | null | undefined} text @returns {number | null} */
 const number = (text) => (text && Number.isFinite(Number(text)) ? Number(text) : null);
 
@@ -33,8 +37,8 @@ const number = (text) => (text && Number.isFinite(Number(text)) ? Number(text) :
 export class Share {
   /** @param {Link} link @param {Camera} camera @param {Strips} strips @param {Attention} attention @param {Controls} controls
    * @param {Body} body @param {() => void} redraw @param {(id: string) => HTMLElement} part
-   * @param {Branches} branches @param {(words: string) => void} tell says what of a link cannot be shown */
-  constructor(link, camera, strips, attention, controls, body, redraw, part, branches, tell) {
+   * @param {Branches} branches @param {Fitting} fitting @param {(words: string) => void} tell says what of a link cannot be shown */
+  constructor(link, camera, strips, attention, controls, body, redraw, part, branches, fitting, tell) {
     this.link = link;
     this.camera = camera;
     this.strips = strips;
@@ -43,6 +47,7 @@ export class Share {
     this.redraw = redraw;
     this.tell = tell;
     this.branches = branches;
+    this.fitting = fitting;
     /** goes to the view that the page was opened with */
     this.opens = (/** @type {string} */ _) => {};
     /** the curves that the page began with */
@@ -180,8 +185,14 @@ export class Share {
       this.matrix.getAttribute('aria-pressed') === 'true' ||
       (camera.zoom === 1 && camera.shift.every((one) => Math.abs(one) < HALF));
     if (!isWhole) said.set('view', this.seen().join(' '));
+    if (!isWhole && this.window !== USUAL) said.set('window', this.window);
     if (curves !== this.begun) said.set('curves', curves);
     return said.toString();
+  }
+
+  /** The window that the picture is laid out for. @returns {string} */
+  get window() {
+    return this.link.scene?.window ?? USUAL;
   }
 
   /** Which part of the picture is seen: how many times as large as the whole, and the units in the middle of the window.
@@ -225,7 +236,8 @@ export class Share {
       branch = number(said.get('branch')),
       saved = said.get('saved');
     const view = said.get('view')?.split(' ').map(number) ?? [];
-    if (view.length === 3 && !view.includes(null)) this.see(/** @type {number[]} */ (view));
+    if (view.length === 3 && !view.includes(null))
+      this.fitting.see(said.get('window') ?? USUAL, () => this.see(/** @type {number[]} */ (view)));
     if (curves !== null) this.pin(curves);
     const missing = branch === null ? '' : this.branches.go(branch);
     if (missing) this.tell(missing);

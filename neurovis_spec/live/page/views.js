@@ -4,6 +4,7 @@
 
 import { button, retype } from './naming.js';
 import { refOf } from './protocol.js';
+import { USUAL } from './share.js';
 
 /** @typedef {import('./appearance.js').Appearance} Appearance */
 /** @typedef {import('./protocol.js').Group} Group */
@@ -160,6 +161,7 @@ export class Views {
       theme: this.appearance.chosen,
       closed: zoom.boxes.filter(({ id }) => zoom.hand.has(id)).map(({ path }) => path),
       shows: this.asMatrix() ? 'matrix' : this.appearance.shown.pathways ? 'pathways' : 'network',
+      window: this.asMatrix() || share.window === USUAL ? null : share.window,
     };
   }
 
@@ -194,7 +196,7 @@ export class Views {
   }
 
   /** Have a page, and the owner's run, be as a view says. @param {SavedView} view */
-  show({ step, speed, camera, curves, theme, closed, shows }) {
+  show({ step, speed, camera, curves, theme, closed, shows, window }) {
     const { share, zoom } = this,
       missing = curves ? this.pin(curves) : [];
     if (closed) {
@@ -208,7 +210,7 @@ export class Views {
     if (shows === null ? camera && this.asMatrix() : (shows === 'matrix') !== this.asMatrix()) share.matrix.click();
     if (turns) appearance.toggle();
     this.next = turns ? camera : null;
-    if (camera && !turns) share.see(this.units(camera, true));
+    if (camera && !turns) share.fitting.see(window ?? USUAL, () => share.see(this.units(camera, true)));
     share.run(step, speed);
     if (missing.length) share.tell(`left out, as there is none here: ${missing.join(', ')}`);
     this.redraw();

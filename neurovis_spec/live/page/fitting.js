@@ -1,0 +1,89 @@
+/**
+ * Fitting: the owner's page says of which shape its window is, so that the network is laid out for it where that shows it
+ * larger; and a part of the picture is seen in the layout in which it was chosen.
+ */
+
+import { windowOf } from './room.js';
+
+/** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Scene} Scene */
+/** @typedef {import('./protocol.js').Status} Status */
+
+/** What takes no longer than this, in milliseconds, is not told. */
+const SOON = 700;
+
+/** Asks for layouts. */
+export class Fitting {
+  /** @param {Link} link @param {HTMLElement} room what network and curves share @param {HTMLElement} words */
+  constructor(link, room, words) {
+    this.link = link;
+    this.room = room;
+    this.words = words;
+    this.owner = false;
+    /** for which window a layout was asked for last, '' for none since the connection is there */
+    this.asked = '';
+    /** what has a part of the picture be seen, once it is laid out for a window @type {{window: string, see: () => void} | null} */
+    this.aim = null;
+    this.timer = 0;
+    matchMedia('(orientation: portrait)').onchange = () => this.turned();
+  }
+
+  /** Of which shape the window is. @returns {string} */
+  get shape() {
+    return windowOf(this.room.clientWidth, this.room.clientHeight);
+  }
+
+  /** The connection is there anew. */
+  begin() {
+    this.asked = '';
+  }
+
+  /** How the run stands, and whatever the page was opened with, is known. @param {Status} status */
+  status({ owner }) {
+    this.owner = owner && this.link.takes.has('fit');
+    if (!this.owner) this.aim = null;
+    else if (!this.asked && this.link.scene) this.ask(this.aim?.window ?? this.shape);
+  }
+
+  /** @param {string} window */
+  ask(window) {
+    this.asked = window;
+    this.link.ask('fit', { window });
+  }
+
+  /** The window was turned; who types has but opened a keyboard. */
+  turned() {
+    const { shape } = this;
+    if (!this.owner || !this.asked || this.asked === shape || document.activeElement?.matches('input')) return;
+    this.aim = null;
+    this.ask(shape);
+  }
+
+  /** See a part of the picture in the layout for a window. @param {string} window @param {() => void} see */
+  see(window, see) {
+    const isThere = this.link.scene?.window === window;
+    this.aim = isThere ? null : { window, see };
+    if (isThere) {
+      this.asked ||= window; // so that the page, which has just been opened with it, asks for no other
+      see();
+    } else if (this.owner && this.asked) this.ask(window);
+  }
+
+  /** Another scene has come. @param {Scene} scene */
+  scene({ window }) {
+    const { aim } = this;
+    if (aim?.window !== window) return;
+    this.aim = null;
+    aim.see();
+  }
+
+  /** The network is being laid out for a window, or no more. @param {string | null} window */
+  told(window) {
+    clearTimeout(this.timer);
+    this.words.hidden = true;
+    if (window !== null)
+      this.timer = setTimeout(() => {
+        this.words.hidden = false;
+      }, SOON);
+  }
+}

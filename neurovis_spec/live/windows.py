@@ -1,0 +1,88 @@
+"""Windows: of which shape the room is that a page gives the network, and the layout that fills it.
+
+In: a compiled network, and of which shape a window is, in three coarse kinds. Out: the network as though its spec asked
+for a page of that shape, with its layout, where it is drawn clearly larger in the window so; else nothing, as where
+somebody says how the network is laid out: its spec, or a layout file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final, Literal, TypeAlias
+
+from neurovis_spec.compilation import Compilation
+from neurovis_spec.layout.geometry import bounds, padded
+from neurovis_spec.layout.model import RADIUS, Layout, LayoutRefusalError
+
+#: Of which shape a window is: higher than wide, wider than high, or neither clearly.
+Window: TypeAlias = Literal["tall", "default", "wide"]
+#: What is this much larger is clearly so; no layout is, where the network has this share of a room that it can have.
+_LARGER: Final = 1.1
+_FILLED: Final = 0.75
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """The page that a network is laid out for, in pixels; and the rooms that it can have in such a window, in equal
+    units: where there are several curves stand beside it, or below it."""
+
+    page: tuple[int, int]
+    rooms: tuple[tuple[float, float], ...]
+
+    def scale(self, layout: Layout) -> float:
+        """How many units of a room a unit of the layout has, where the whole is as large as can be."""
+        wide, high = _sides(layout)
+        return max(min(across / wide, down / high) for across, down in self.rooms)
+
+    def is_filled(self, layout: Layout) -> bool:
+        """Whether the network takes most of a room, so that no layout can be much larger in it."""
+        wide, high = _sides(layout)
+        ratios = [(across / wide, down / high) for across, down in self.rooms]
+        return any(min(both) >= _FILLED * max(both) for both in ratios)
+
+
+#: By what a page says of its window; in others the network is laid out as anywhere. The rooms are those of a telephone
+#: (390x844), and of a window of 1280x800, which one of 1920x1080 is much alike.
+SHAPES: Final[Mapping[Window, Shape]] = {
+    "tall": Shape((720, 920), ((390.0, 500.0),)),
+    "wide": Shape((1440, 960), ((990.0, 690.0), (1280.0, 470.0))),
+}
+
+
+def fitted(compiled: Compilation, engine: str | None, window: Window) -> tuple[Compilation, Layout] | None:
+    """A network for a window of this shape; None where it is drawn in its own layout. Raises LayoutRefusalError where
+    it has none."""
+    shape = SHAPES.get(window)
+    if shape is None or not is_free(compiled):
+        return None
+    own = compiled.placed(engine)
+    if shape.is_filled(own):
+        return None
+    made = compiled.of_size(shape.page)
+    try:
+        layout = made.placed(engine)
+    except LayoutRefusalError:
+        return None
+    return (made, layout) if shape.scale(layout) >= _LARGER * shape.scale(own) else None
+
+
+def is_free(compiled: Compilation) -> bool:
+    """Whether nobody says how a network is laid out: no page, direction, place, or layout file."""
+    if compiled.network.render.size is not None or compiled.layout_file is not None:
+        return False
+    problem = compiled.problem
+    return bool(problem.neurons) and not problem.places and replace(problem, aspect=1.0).turns
+
+
+def window_of(compiled: Compilation) -> Window:
+    """The window for which a network is laid out."""
+    size = compiled.network.render.size
+    return next((window for window, shape in SHAPES.items() if shape.page == size), "default")
+
+
+def _sides(layout: Layout) -> tuple[float, float]:
+    """How wide and high all of a layout is, with its discs."""
+    points = [*layout.positions.values(), *(point for route in layout.routes.values() for point in route)]
+    x0, y0, x1, y1 = padded(bounds(points), RADIUS)
+    return x1 - x0, y1 - y0

@@ -1,0 +1,317 @@
+"""Layouts for windows: asked for by the owner's page, taken where the network is drawn larger so, and nowhere else."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+import numpy as np
+import pytest
+from examples import SPECS
+from test_live_server import Eyes, Live, served
+
+import neurovis_spec as nv
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.layout.model import LayoutRefusalError
+from neurovis_spec.live.commands import Appearance, Draw, Fetch, Fit, PlaceNeuron, Save, Seek, Unplace, Write
+from neurovis_spec.live.desk import Desk, Written
+from neurovis_spec.live.live import Edited, Edits
+from neurovis_spec.live.pins import placed
+from neurovis_spec.live.protocol import FILE, ProtocolError, command_of
+from neurovis_spec.live.run import Run
+from neurovis_spec.live.saved_views import SavedView, keep, views_in
+from neurovis_spec.live.show import Show
+from neurovis_spec.live.view import View
+from neurovis_spec.live.windows import SHAPES, Window, fitted
+
+#: A fan that is wide as it is laid out anywhere, and can be high.
+FAN = """neurovis: 1
+name: fan
+title: A fan
+neurons: {A: {activation: tanh, bias: 0.1}, N: {count: 12, activation: tanh}}
+connections: {A -> N: 1}
+"""
+DIRECTED = "\nlayout: {direction: down}\n"
+
+
+def compiled(text: str = FAN, folder: Path | None = None) -> nv.CompiledNetwork:
+    return nv.compile_text(text, file="x.yaml", folder=folder)
+
+
+def told(view: View) -> str:
+    """The window that a page is told of."""
+    return str(json.loads(gzip.decompress(view.content))["window"])
+
+
+def test_a_network_is_laid_out_for_a_window_in_which_it_is_larger_so() -> None:
+    network = compiled()
+    found = fitted(network, None, "tall")
+    assert found is not None
+    made, layout = found
+    assert layout == network.placed(size=SHAPES["tall"].page), "that of render --size"
+    assert SHAPES["tall"].scale(layout) >= 1.1 * SHAPES["tall"].scale(network.placed())
+    assert (made.hash, made.of_size(None).placed()) == (network.hash, network.placed())
+    assert np.array_equal(made.gains.activity, network.gains.activity)
+    assert fitted(network, None, "wide") is None, "it is as large as it can be"
+    assert fitted(network, None, "default") is None
+    assert placed(network).layout is network.placed()
+
+
+@pytest.mark.parametrize("spec", ["mlp.yaml", "ring.yaml", "cpg_rbf.yaml", "walk/walk.yaml", "worm/worm.yaml"])
+@pytest.mark.parametrize("window", ["tall", "wide"])
+def test_examples_are_laid_out_as_ever(spec: str, window: Window) -> None:
+    network = nv.compile(SPECS / spec)
+    found = placed(network, None, window)
+    assert found.compiled is network
+    assert found.layout is network.placed()
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        DIRECTED,
+        "\nrender: {size: [900, 700]}\n",
+        "\nlayout: {positions: {N1: [0, 0]}}\n",
+        "\nlayout: {file: x.layout.yaml}\n",
+        "\nlayout: {arrange: {N: ring}}\n",
+    ],
+)
+def test_who_says_how_a_network_is_laid_out_is_heard(more: str, tmp_path: Path) -> None:
+    network = compiled(FAN + more, tmp_path)
+    for window in SHAPES:
+        assert fitted(network, None, window) is None
+
+
+def test_given_places_are_heard() -> None:
+    text = FAN.replace("count: 12,", "count: 12, position: [i, 0.5*i],").replace(
+        "bias: 0.1}", "bias: 0.1, position: [3, 9]}"
+    )
+    for window in SHAPES:
+        assert fitted(compiled(text), None, window) is None
+
+
+def test_what_cannot_be_laid_out_for_a_window_is_drawn_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    network, own = compiled(), compiled().placed()
+
+    def refused(self: nv.CompiledNetwork, *_: object, **__: object) -> object:
+        if self.network.render.size is not None:
+            raise LayoutRefusalError("too-large", "no")
+        return own
+
+    monkeypatch.setattr(nv.CompiledNetwork, "placed", refused)
+    assert fitted(network, None, "tall") is None
+
+
+@dataclass
+class Watched:
+    """A run that somebody looks on at, and its desk; what all are told."""
+
+    folder: Path
+    show: Show = field(default_factory=Show)
+    said: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def path(self) -> Path:
+        return self.folder / "x.yaml"
+
+    def compile(self) -> nv.CompiledNetwork:
+        return nv.compile(self.path)
+
+    def begin(self, playing: bool) -> None:
+        network = self.compile()
+        source, view = self.show.stage(network)
+        self.run = Run(source, view, lambda _: None, lambda: False, playing=playing)
+        written = Written(self.path, lambda text: nv.compile_text(text, file=str(self.path), folder=self.folder))
+        tell = lambda text: self.said.append(json.loads(text))  # noqa: E731
+        self.desk = Desk(network, None, self.show.view, self.run, tell, written)
+        self.edits = Edits(self.show, Edited(self.path, self.compile), self.run, tell, self.desk)
+        self.run.start()
+        self.desk.start()
+
+    def ask(self, request: Any) -> str | bytes:
+        """Ask the desk, and wait until it has answered."""
+        answers = SimpleQueue[str | bytes]()
+        self.desk.ask(request, answers.put)
+        return answers.get(timeout=60)
+
+    def fit(self, window: Window) -> str:
+        """Ask for a window, and wait until it is known what comes of it; the window of what is shown."""
+        self.desk.ask(Fit(window), lambda _: None)
+        return self.settled()
+
+    def settled(self) -> str:
+        """The window of what is shown, when nothing is being done."""
+        for _ in range(2):  # what is put into the queue while it is asked
+            while True:
+                self.ask(Save("events"))
+                if not [one for one in self.said if one["type"] == "fitting"][-1:] or self.last("fitting") is None:
+                    break
+        self.done()
+        return told(self.run.view)
+
+    def last(self, kind: str) -> Any:
+        return [one for one in self.said if one["type"] == kind][-1]["window"]
+
+    def done(self) -> None:
+        """Wait until the run has done what it was asked."""
+        answer = SimpleQueue[str]()
+        self.run.inquire(lambda _: answer.put(""))
+        answer.get(timeout=60)
+
+    def edit(self, text: str) -> str:
+        self.path.write_text(text)
+        self.edits._edited()
+        return told(self.run.view)
+
+
+@contextmanager
+def watched(folder: Path, text: str = FAN, playing: bool = False, show: Show | None = None) -> Iterator[Watched]:
+    made = Watched(folder, show or Show())
+    made.path.write_text(text)
+    made.begin(playing)
+    try:
+        yield made
+        assert made.run.failure is None
+    finally:
+        made.desk.end()
+        made.run.end()
+
+
+def test_the_picture_is_that_of_the_window_that_was_asked_for_last(tmp_path: Path) -> None:
+    with watched(tmp_path) as live:
+        own = live.run.view
+        assert [live.fit(window) for window in ("tall", "wide", "tall")] == ["tall", "default", "tall"]
+        size = SHAPES["tall"].page
+        assert live.run.view.layout == live.compile().placed(size=size)
+        saved = live.ask(Fetch("svg", 1.0))
+        assert isinstance(saved, bytes)
+        assert saved[0] == FILE
+        head = 4 + int.from_bytes(saved[2:4], "little")
+        live.compile().render(tmp_path / "x.svg", step=0, size=size)
+        assert saved[head:] == (tmp_path / "x.svg").read_bytes()
+        assert live.fit("default") == "default"
+        assert live.run.view.content == own.content, "as it began"
+
+
+def test_the_picture_is_as_large_with_pathways_and_in_another_theme(tmp_path: Path) -> None:
+    with watched(tmp_path) as live:
+        live.run.ask(Draw(Appearance(pathways=True)))
+        while not live.run.view.appearance.pathways:
+            live.done()
+        assert live.fit("tall") == "tall"
+        assert told(live.run.view.dressed("dark")) == "tall"
+        live.run.ask(Draw(Appearance(activity=2.0)))
+        while live.run.view.appearance.pathways:
+            live.done()
+        assert told(live.run.view) == "tall"
+        assert live.run.view.layout == live.compile().placed(size=SHAPES["tall"].page)
+
+
+def test_what_was_put_by_hand_stays_and_what_is_undone_is_laid_out(tmp_path: Path) -> None:
+    with watched(tmp_path) as live:
+        live.desk.ask(PlaceNeuron("N3", (2.0, 5.0), done=True), lambda _: None)
+        assert live.fit("tall") == "default"
+        assert live.run.view.layout.positions["N3"] == (2.0, 5.0)
+        live.desk.ask(Unplace(), lambda _: None)
+        assert live.settled() == "tall"
+        others = dict(live.run.view.layout.positions)
+        live.desk.ask(PlaceNeuron("N3", (3.0, 2.0), done=True), lambda _: None)
+        assert live.fit("default") == "tall", "only the neuron moves"
+        moved = live.run.view.layout.positions
+        assert {name for name in moved if moved[name] != others[name]} == {"N3"}
+        assert live.edit(FAN.replace("bias: 0.1", "bias: 0.2")) == "tall"
+        assert live.run.view.layout.positions["N3"] == (3.0, 2.0)
+
+
+@pytest.mark.parametrize("into", ["spec", "file"])
+def test_what_is_saved_is_drawn_as_it_was_shown(tmp_path: Path, into: Any) -> None:
+    with watched(tmp_path) as live:
+        live.fit("tall")
+        x, y = live.run.view.layout.positions["N3"]
+        live.desk.ask(PlaceNeuron("N3", (x + 1.0, y), done=True), lambda _: None)
+        assert "saving" in str(live.ask(Save(into)))
+        assert "true" in str(live.ask(Write()))
+        shown = live.run.view.layout.positions
+        assert live.fit("default") == "default", "the spec says it by now"
+        for positions in (live.run.view.layout.positions, live.compile().placed().positions):
+            assert all(positions[name] == pytest.approx(at) for name, at in shown.items()), "and nothing has moved"
+
+
+def test_edits_keep_the_window(tmp_path: Path) -> None:
+    with watched(tmp_path) as live:
+        assert live.fit("tall") == "tall"
+        view = live.run.view
+        assert live.edit(FAN.replace("A fan", "Another")) == "tall"
+        assert live.run.view.layout is view.layout
+        assert live.run.view.plan.title == "Another"
+        assert live.edit(FAN.replace("A fan", "Another").replace("count: 12", "count: 14")) == "tall"
+        assert live.edit(FAN + DIRECTED) == "default"
+        assert live.edit(FAN) == "tall"
+        assert live.edit("neurovis: 1") == "tall", "what cannot be shown changes nothing"
+        assert live.edit(FAN.replace("A fan", "A third")) == "tall"
+
+
+def test_a_run_goes_on_to_where_it_was_sent(tmp_path: Path) -> None:
+    with watched(tmp_path, playing=True) as live:
+        live.run.ask(Seek(10_000))
+        assert live.fit("tall") == "tall"
+        while live.run._running:
+            live.done()
+        assert live.run.shown().glance.step == 10_000
+
+
+def test_recordings_are_laid_out_for_a_window(tmp_path: Path) -> None:
+    recording = compiled().run(20)
+    with watched(tmp_path, show=Show(recording)) as live:
+        assert live.fit("tall") == "tall"
+        assert live.run.view.layout == live.compile().placed(size=SHAPES["tall"].page)
+
+
+def test_an_engine_that_fails_leaves_the_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise RuntimeError("no")
+
+    with watched(tmp_path) as live:
+        monkeypatch.setattr("neurovis_spec.live.pins.fitted", fails)
+        assert live.fit("tall") == "default"
+
+
+def test_only_owners_ask_and_only_for_windows_that_there_are() -> None:
+    async def test(live: Live) -> None:
+        async with live.stream(live.access.viewer) as viewing, live.stream(live.access.owner) as owning:
+            viewer, owner = Eyes(viewing), Eyes(owning)
+            await viewing.send_json({"type": "fit", "window": "tall"})
+            await viewer.until(lambda: any(one["type"] == "refused" for one in viewer.told))
+            await owning.send_json({"type": "fit", "window": "tall"})
+            await owner.until(lambda: owner.scene != {})
+            assert not any(one["type"] == "refused" for one in owner.told)
+
+    served(test)
+    for text in ('{"type": "fit"}', '{"type": "fit", "window": "low"}', '{"type": "fit", "window": [3, 4]}'):
+        with pytest.raises(ProtocolError):
+            command_of(text)
+    assert command_of('{"type": "fit", "window": "wide"}') == Fit("wide")
+
+
+def test_a_saved_view_has_the_window_of_its_camera(tmp_path: Path) -> None:
+    path, network = tmp_path / "x.neurovis-view.yaml", compiled().network
+    keep(path, "near", SavedView(3, "1", (2.0, 1.0, 1.0), (), "", (), "tall"))
+    keep(path, "far", SavedView(3, "1", (2.0, 1.0, 1.0), (), "", ()))
+    findings = Findings()
+    assert {name: view.window for name, view in views_in(path, network, findings).items()} == {
+        "near": "tall",
+        "far": None,
+    }
+    assert path.read_text().count("window") == 1
+    keep(path, "near", SavedView(3, "1", (2.0, 1.0, 1.0), (), "", ()))
+    assert views_in(path, network, findings)["near"].window is None
+    assert not findings.sorted()
+    path.write_text(path.read_text().replace("window: null", "window: round"))
+    assert views_in(path, network, findings)["near"].window is None
+    assert [one.code for one in findings.sorted()] == ["wrong-type"]
