@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import gzip
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
@@ -13,19 +14,27 @@ from typing import Any
 
 import numpy as np
 import pytest
+from chromium import Page, chromium
 from examples import SPECS
+from live_window import HEAD, area_of
+from test_live_browser import STEP
+from test_live_hand import holds
+from test_live_room import box, discs
 from test_live_server import Eyes, Live, served
 
 import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout.model import LayoutRefusalError
-from neurovis_spec.live.commands import Appearance, Draw, Fetch, Fit, PlaceNeuron, Save, Seek, Unplace, Write
+from neurovis_spec.live.access import Access
+from neurovis_spec.live.commands import REQUESTS, Appearance, Draw, Fetch, Fit, PlaceNeuron, Save, Seek, Unplace, Write
 from neurovis_spec.live.desk import Desk, Written
-from neurovis_spec.live.live import Edited, Edits
+from neurovis_spec.live.hub import Hub
+from neurovis_spec.live.live import Edited, Edits, listen
 from neurovis_spec.live.pins import placed
 from neurovis_spec.live.protocol import FILE, ProtocolError, command_of
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.saved_views import SavedView, keep, views_in
+from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show
 from neurovis_spec.live.view import View
 from neurovis_spec.live.windows import SHAPES, Window, fitted
@@ -315,3 +324,108 @@ def test_a_saved_view_has_the_window_of_its_camera(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("window: null", "window: round"))
     assert views_in(path, network, findings)["near"].window is None
     assert [one.code for one in findings.sorted()] == ["wrong-type"]
+
+
+@asynccontextmanager
+async def opened(folder: Path, text: str) -> AsyncIterator[tuple[Page, Access, Run]]:
+    """A browser, and a live view that knows files, at which nobody looks yet."""
+    network, show, hub = compiled(text), Show(), Hub(asyncio.get_running_loop(), REQUESTS)
+    run = Run(*show.stage(network), hub.show, lambda: hub.watched)
+    sock = listen("127.0.0.1", 0)
+    access = Access("127.0.0.1", sock.getsockname()[1], viewers=True)
+    desk = Desk(network, None, show.view, run, hub.keep_soon)
+    server = Server(access, hub, run, desk)
+    await server.start(sock)
+    run.start()
+    desk.start()
+    try:
+        async with chromium(folder) as page:
+            yield page, access, run
+            assert page.errors == []
+    finally:
+        desk.end()
+        run.end()
+        await server.stop()
+
+
+def share_of(view: View, picture: list[float]) -> float:
+    """How many pixels the neurons of a view have where the picture of the page is there."""
+    corners = [place(view, picture, x + way * r, y + way * r) for x, y, r in discs(view).values() for way in (-1, 1)]
+    wide, high = np.ptp(np.array(corners), axis=0).tolist()
+    return float(wide * high)
+
+
+def place(view: View, picture: list[float], x: float, y: float) -> tuple[float, float]:
+    """Where a point of a view is in the window, as a whole."""
+    left, top, right, bottom = picture
+    area = area_of(view)
+    across, down = area.within((right - left, bottom - top), area.at(x, y))
+    return across + left, down + top - HEAD
+
+
+async def shows(page: Page, view: View) -> list[float]:
+    """Wait until a page shows a view as a whole; where its picture is."""
+    name, (x, y, _) = next(iter(discs(view).items()))
+    await holds(page, place(view, await box(page, "#picture"), x, y), name)
+    return await box(page, "#picture")
+
+
+@pytest.mark.browser
+def test_a_network_that_is_wide_is_high_on_a_telephone_and_wide_again_when_that_is_turned(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with opened(tmp_path, FAN) as (page, access, run):
+            own = run.view
+            await page.size(390, 844)
+            await page.call("Page.navigate", url=access.url(owner=False))
+            await page.until(f"{STEP} > 3")
+            assert told(run.view) == "default", "who only looks on asks for nothing"
+            await page.call("Page.navigate", url=access.url())
+            await page.until(f"{STEP} > 3")
+            while run.view is own:
+                await asyncio.sleep(0.1)
+            assert told(run.view) == "tall"
+            picture = await shows(page, run.view)
+            assert share_of(run.view, picture) >= 1.3 * share_of(own, picture)
+            assert await page.ask("document.querySelector('#fitting').hidden")
+            (tmp_path / "tall.png").write_bytes(await page.shot())
+            await page.size(400, 860)
+            await page.until("picture.clientWidth == 400")
+            await page.size(1280, 800)
+            await page.until("picture.clientWidth > 900")
+            while told(run.view) != "default":
+                await asyncio.sleep(0.1)
+            assert run.view.layout is own.layout
+            await shows(page, own)
+
+    asyncio.run(asyncio.wait_for(main(), 240))
+
+
+@pytest.mark.browser
+def test_a_link_shows_a_part_of_the_picture_in_the_layout_that_it_was_in(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with opened(tmp_path, FAN) as (page, access, run):
+            await page.size(390, 844)
+            await page.call("Page.navigate", url=access.url())
+            while told(run.view) != "tall":
+                await asyncio.sleep(0.1)
+            await shows(page, run.view)
+            await page.ask("document.querySelector('#picture').focus()")
+            for key in "++l":
+                await page.key(key)
+            await page.until("location.hash.includes('view=') && location.hash.includes('window=tall')")
+            link = str(await page.ask("location.href"))
+            await page.call("Page.navigate", url="about:blank")
+            await page.size(1280, 800)
+            await page.call("Page.navigate", url=access.url())
+            while told(run.view) != "default":
+                await asyncio.sleep(0.1)
+            await page.until(f"{STEP} > 3")
+            assert "view=" not in str(await page.ask("location.hash"))
+            await page.call("Page.navigate", url="about:blank")
+            await page.call("Page.navigate", url=link)
+            while told(run.view) != "tall":
+                await asyncio.sleep(0.1)
+            wanted = link.partition("#")[2].partition("view=")[2].partition("&")[0]
+            await page.until(f"location.hash.includes('view={wanted}') && location.hash.includes('window=tall')")
+
+    asyncio.run(asyncio.wait_for(main(), 240))
