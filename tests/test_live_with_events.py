@@ -8,13 +8,14 @@ from contextlib import contextmanager
 from difflib import SequenceMatcher
 from pathlib import Path
 from queue import SimpleQueue
+from typing import Literal
 
 import pytest
 from test_live_saving import FOLLOWING
 
 import neurovis_spec as nv
 from neurovis_spec.live.carry import carried
-from neurovis_spec.live.commands import Fetch, Save, Seek, Write
+from neurovis_spec.live.commands import Fetch, Into, PlaceNeuron, Save, Seek, Write
 from neurovis_spec.live.desk import Desk, Written
 from neurovis_spec.live.pins import Compile, SavingError
 from neurovis_spec.live.recorded import RecordedSource
@@ -221,3 +222,38 @@ def test_it_is_shown_then_written_and_written_anew(tmp_path: Path) -> None:
     network = nv.compile(path)
     with desk_of(path, compile, RecordedSource(network.network, network.run(5))) as (_, desk):
         assert "what is played" in str(told(desk, Fetch("yaml", 1))["reason"])
+
+
+@pytest.mark.parametrize("into", ["spec", "file"])
+@pytest.mark.parametrize("text", ["none", "block", "braces"])
+def test_neurons_put_by_hand_are_saved_beside_events_that_were_saved_before_them(
+    tmp_path: Path, into: Literal["spec", "file"], text: str
+) -> None:
+    """And these once, whatever is saved next; the file is drawn as the page is."""
+    compile, path, answers = compiler(tmp_path), tmp_path / "odd.yaml", SimpleQueue[str | bytes]()
+    path.write_text(TEXTS[text])
+    with desk_of(path, compile) as (turn, desk):
+
+        def saved(into: Into) -> None:
+            desk.ask(Save(into), answers.put)
+            answer = json.loads(answers.get(timeout=30))
+            assert answer["type"] == "saving", answer
+            desk.ask(Write(), answers.put)
+            assert json.loads(answers.get(timeout=30))["written"]
+
+        turn(10, Lesion("A2"))
+        saved("events")
+        desk.ask(PlaceNeuron("S", (9.0, 4.0), True), answers.put)
+        saved(into)
+        turn(14, Lesion("A3"))
+        saved("events")
+        desk.ask(PlaceNeuron("S", (7.0, 5.0), True), answers.put)
+        saved(into)
+        saved("events")
+        now = nv.compile(path)
+        assert now.placed().positions == desk.placed.layout.positions
+        assert path.read_text().count("lesion: A2") == path.read_text().count("lesion: A3") == 1
+        assert now.placed().positions["S"] == (7.0, 5.0)
+        path.write_text(path.read_text().replace("count: 3", "count: 4"))
+        desk.ask(Save(into), answers.put)
+        assert "another network by now" in str(answers.get(timeout=30))

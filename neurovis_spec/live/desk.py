@@ -52,7 +52,7 @@ from neurovis_spec.live.turns import Turned
 from neurovis_spec.live.view import View
 from neurovis_spec.live.watch import Watch
 from neurovis_spec.live.windows import Window
-from neurovis_spec.live.with_events import WithEvents, with_events
+from neurovis_spec.live.with_events import WithEvents, with_events, without
 from neurovis_spec.progress import Progress
 
 _LOG: Final = logging.getLogger(__name__)
@@ -212,7 +212,8 @@ class Desk:
                 answer(saving_message([str(file.path)], file.diff, written=False, into="events"))
             case Save():
                 self._events = None
-                self._saving = saving(self._placed, self._written().path, self._written().compile, request.into)
+                spec = self._written()
+                self._saving = saving(self._placed, spec.path, spec.compile, request.into, self._own)
                 names = [str(file.path) for file in self._saving.files]
                 answer(saving_message(names, self._saving.diff, written=False, into=request.into))
             case Write():
@@ -285,6 +286,10 @@ class Desk:
             raise SavingError("there is no file to save to")
         return self._spec
 
+    def _own(self, text: str) -> str | None:
+        """The text of the spec without the events that were written from here."""
+        return None if self._noted is None else without(text, self._noted)
+
     def _views(self) -> Path:
         return file_beside(self._written().path)
 
@@ -299,8 +304,10 @@ class Desk:
             self._noted = self._events
             answer(saving_message(files, "", written=True, into="events"))
             return
-        compiled = spec.compile(spec.path.read_text(encoding="utf-8-sig"))
-        self._placed = self._placed.written(compiled)
+        text = spec.path.read_text(encoding="utf-8-sig")
+        if chosen.base is not None and self._noted is not None:
+            self._noted = replace(self._noted, before=chosen.base, after=text)
+        self._placed = self._placed.written(spec.compile(text if chosen.base is None else chosen.base))
         self._before.clear()
         self._say()
         answer(saving_message(files, "", written=True))

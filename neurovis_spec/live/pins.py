@@ -131,9 +131,11 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Saving:
-    """Files that are to be written."""
+    """Files that are to be written; ``base`` is the spec as it is to be, without events that the run was turned to by
+    hand, where there are some in it."""
 
     files: tuple[File, ...]
+    base: str | None = None
 
     @property
     def diff(self) -> str:
@@ -150,13 +152,18 @@ class Saving:
                 opened.write(file.after.encode())
 
 
-def saving(shown: Placed, spec: Path, compile: Compile, into: Into) -> Saving:
-    """What there is to write. Raises SavingError, SpecError, LayoutRefusalError, OSError."""
+def saving(
+    shown: Placed, spec: Path, compile: Compile, into: Into, own: Callable[[str], str | None] = lambda _: None
+) -> Saving:
+    """What there is to write; ``own`` is the text of the spec without events that were written from here, None where it
+    has none. Raises SavingError, SpecError, LayoutRefusalError, OSError."""
     data = _bytes(spec)
     if data is None:
         raise SavingError(f"{spec.name} is no longer there")
     text = data.decode("utf-8-sig")
-    now = compile(text)
+    now, base = compile(text), None
+    if now.hash != shown.compiled.hash and (base := own(text)) is not None:
+        now = compile(base)
     if now.hash != shown.compiled.hash:
         raise SavingError(f"{spec.name} is another network by now than the one that is shown: use --watch")
     values = _file(shown, now, spec) if into == "file" else _pins(shown, now, text, compile)
@@ -166,7 +173,8 @@ def saving(shown: Placed, spec: Path, compile: Compile, into: Into) -> Saving:
         _check(shown, compile(written).arranged(shown.engine, earlier=shown.layout))
         path = now.layout_file or _beside(spec)
         files.insert(0, File(path, _bytes(path), dump(shown.layout)))
-    return Saving(tuple(file for file in files if file.before != file.after.encode()))
+    kept = put(base, values) if base is not None and values else base
+    return Saving(tuple(file for file in files if file.before != file.after.encode()), kept)
 
 
 def _bytes(path: Path) -> bytes | None:

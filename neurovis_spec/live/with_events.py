@@ -33,12 +33,12 @@ def with_events(
     base, more = text, tuple(turned)
     now = compile(_plain(text)).hash
     if last is not None:
-        without = _without(text, last)
-        if without is not None:
-            before = compile(_plain(without)).hash
+        plain = without(text, last)
+        if plain is not None:
+            before = compile(_plain(plain)).hash
             is_before = now != shown and before == shown
             if is_before or (shown in (now, before) and all(one in turned for one in last.turned)):
-                base, now = without, shown
+                base, now = plain, shown
             else:  # the spec that runs by now has events of its own, which this run was not turned to by hand
                 more = tuple(one for one in turned if one not in last.turned)
         elif any(one in turned for one in last.turned) and _remains(text, last):
@@ -56,7 +56,7 @@ def with_events(
     return WithEvents(base, after, tuple(turned))
 
 
-def _without(text: str, last: WithEvents) -> str | None:
+def without(text: str, last: WithEvents) -> str | None:
     """A text without what was written before, wherever that stands in it by now; None where it does not, as it was."""
     was, written = _changed(last)
     return text.replace(written, was) if text.count(written) == 1 else None
