@@ -28,12 +28,12 @@ from chromium import Page, chromium
 import neurovis_spec as nv
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.commands import REQUESTS
+from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.live import listen
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import Server
-from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.view import view_of
+from neurovis_spec.live.show import Show
 
 HERE = Path(__file__).parent
 SPECS = ("cpg_rbf.yaml", "hexapod/hexapod.yaml", "walk/walk.yaml", "reward.yaml", "mlp.yaml", "ring.yaml")
@@ -166,16 +166,19 @@ class Looked:
 async def served(spec: Path) -> AsyncIterator[str]:
     """The address of a live view of a spec."""
     compiled = nv.compile(spec)
-    hub = Hub(asyncio.get_running_loop(), REQUESTS)
-    run = Run(SimulatedSource(compiled.simulator()), view_of(compiled, compiled.gains), hub.show, lambda: hub.watched)
+    hub, show = Hub(asyncio.get_running_loop(), REQUESTS), Show()
+    run = Run(*show.stage(compiled), hub.show, lambda: hub.watched)
+    desk = Desk(compiled, None, show.view, run, hub.keep_soon)
     sock = listen("127.0.0.1", 0)
     access = Access("127.0.0.1", sock.getsockname()[1])
-    server = Server(access, hub, run)
+    server = Server(access, hub, run, desk)
     await server.start(sock)
     run.start()
+    desk.start()
     try:
         yield access.url()
     finally:
+        desk.end()
         run.end()
         await server.stop()
 

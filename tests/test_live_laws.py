@@ -593,6 +593,7 @@ MESSAGES = st.one_of(
                      {"type": "restart"}, {"type": "pause"},
                      {"type": "look", "items": ["n0", "c99"]},
                      {"type": "trace", "items": ["n0"], "rasters": ["n1", "n99"], "first": 0, "every": 2, "bins": 9},
+                     {"type": "fit", "window": "tall"}, {"type": "fit", "window": "wide"},
                      {"type": "fetch", "what": "npz", "seconds": 1}]),
 )  # fmt: skip
 

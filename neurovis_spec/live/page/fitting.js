@@ -9,6 +9,8 @@ import { windowOf } from './room.js';
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./protocol.js').Status} Status */
 
+/** Of which shape a window can be. */
+const SHAPES = ['tall', 'default', 'wide'];
 /** What takes no longer than this, in milliseconds, is not told. */
 const SOON = 700;
 
@@ -59,8 +61,10 @@ export class Fitting {
     this.ask(shape);
   }
 
-  /** See a part of the picture in the layout for a window. @param {string} window @param {() => void} see */
-  see(window, see) {
+  /** See a part of the picture in the layout for a window; what an address says need not be one. @param {string} said
+   * @param {() => void} see */
+  see(said, see) {
+    const window = SHAPES.includes(said) ? said : 'default';
     const isThere = this.link.scene?.window === window;
     this.aim = isThere ? null : { window, see };
     if (isThere) {

@@ -153,7 +153,7 @@ const link = new Link({
     if (first) blank();
     choose(matrix !== null);
     if (!matrix) stays?.();
-    if (isOther) camera.fit();
+    if (isOther && !matrix) camera.fit();
     fitting.scene(scene);
     part('titled').textContent = scene.title;
     beside.use(scene);
