@@ -15,7 +15,7 @@ import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.scene import THEMES, Scene, colours, still
 from neurovis_spec.scene.collapse import gathered
-from neurovis_spec.scene.gathered_layout import laid_out
+from neurovis_spec.scene.gathered_layout import standing
 from neurovis_spec.scene.look import Excerpt, excerpted
 from neurovis_spec.scene.teachers import drawn_teachers
 
@@ -215,11 +215,11 @@ def test_a_glyph_says_how_many_neurons_it_holds_however_small_it_is(tmp_path: Pa
 def test_the_plan_of_the_page_holds_where_glyphs_are_laid_out_anew(collapse: list[str]) -> None:
     plan = "right]], plan: [[left1, P, right1], [left2, null, right2]]}"
     network = nv.compile_text(MODULES.replace("right]]}", plan))
-    members = excerpted(network.network, network.network.render, Excerpt(collapse)).collapse
+    settings = excerpted(network.network, network.network.render, Excerpt(collapse))
     there = network.placed()
     together = replace(there, positions=dict.fromkeys(there.positions, (0.0, 0.0)))
     where: dict[str, list[tuple[float, float]]] = {}
-    for name, point in laid_out(gathered(network.network, members), together).positions.items():
+    for name, point in standing(network.network, together, settings)[1].positions.items():
         where.setdefault(name.partition(".")[0], []).append(point)
     x, y = ({name: np.mean(places, axis=0)[axis] for name, places in where.items()} for axis in (0, 1))
     for row in "12":
