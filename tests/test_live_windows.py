@@ -310,7 +310,7 @@ def test_only_owners_ask_and_only_for_windows_that_there_are() -> None:
 
 def test_a_saved_view_has_the_window_of_its_camera(tmp_path: Path) -> None:
     path, network = tmp_path / "x.neurovis-view.yaml", compiled().network
-    keep(path, "near", SavedView(3, "1", (2.0, 1.0, 1.0), (), "", (), "tall"))
+    keep(path, "near", SavedView(3, "1", (2.0, 1.0, 1.0), (), "", (), window="tall"))
     keep(path, "far", SavedView(3, "1", (2.0, 1.0, 1.0), (), "", ()))
     findings = Findings()
     assert {name: view.window for name, view in views_in(path, network, findings).items()} == {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from click.testing import CliRunner
@@ -18,6 +19,7 @@ from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.commands import Keep, Rekeep, Unkeep
 from neurovis_spec.live.protocol import ProtocolError, command_of, views_message
 from neurovis_spec.live.saved_views import SHOWN, SavedView, call, file_beside, forget, keep, views_in
+from neurovis_spec.live.windows import Window
 
 TEXT = """neurovis: 1
 name: x
@@ -39,6 +41,7 @@ views = st.builds(
     theme=st.sampled_from(["", "dark", "default", "print"]),
     closed=st.lists(texts, max_size=3).map(tuple),
     shows=st.none() | st.sampled_from(SHOWN),
+    window=st.sampled_from([None, *get_args(Window)]),
 )
 
 
