@@ -20,7 +20,7 @@ from neurovis_renderers.sheet import WHOLE, Sheet, Words, bytes_of, lanes_of
 from neurovis_spec.scene import Group, IntArray, Polygon, Polyline
 
 #: Frames that are drawn at once.
-FRAMES = 4
+FRAMES = 8
 #: Fragments that a group may have, and pixels of pages, that are drawn at once, whatever hides them.
 _MOST, _MOST_PIXELS = 1 << 22, 1 << 23
 #: Pixels that are left around what may be seen of a group, before it and behind it.

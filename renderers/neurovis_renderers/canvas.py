@@ -94,24 +94,23 @@ def _over_filled(fragments: Fragments, behind: npt.NDArray[np.int32], paints: In
     np.maximum.at(behind, whole.pixels, whole.owners.astype(np.int32))
     seen = (fragments.shares < 1) & (fragments.owners > behind[fragments.pixels])
     some = fragments.only(np.flatnonzero(seen))
-    by_pixel = slots(some, front)
-    left, sums = by_pixel.composed(some.shares, paints[some.owners])
-    under = behind[by_pixel.pixels]
+    one, several = _told_apart(some, len(behind))
+    by_pixel, weights = slots(several, front), np.rint(WHOLE * one.shares)
+    left, sums = by_pixel.composed(several.shares, paints[several.owners])
+    pixels = np.concatenate([by_pixel.pixels, one.pixels])
+    left = np.concatenate([left, WHOLE - weights])
+    sums = np.concatenate([sums, weights.astype(np.int64) * paints[one.owners]])
+    under = behind[pixels]
     sums += np.where(under < 0, 0, left.astype(np.int64) * paints[under])
     left[under >= 0] = 0
-    behind[by_pixel.pixels] = -1
+    behind[pixels] = -1
     covered = np.flatnonzero(behind >= 0)
-    return Composed(by_pixel.pixels, *_shades(sums, left), covered, behind[covered].astype(np.int64))
+    return Composed(pixels, *_shades(sums, left), covered, behind[covered].astype(np.int64))
 
 
 def _mostly_alone(fragments: Fragments, paints: IntArray, front: int, pixels: int) -> Composed:
     """The same where most pixels have one fragment alone, which needs no sorting."""
-    every = np.arange(len(fragments), dtype=np.int32)
-    last = np.empty(pixels, np.int32)
-    last[fragments.pixels] = every
-    last[fragments.pixels[last[fragments.pixels] != every]] = -1
-    alone = last[fragments.pixels] >= 0
-    some, several = fragments.only(np.flatnonzero(alone)), fragments.only(np.flatnonzero(~alone))
+    some, several = _told_apart(fragments, pixels)
     by_pixel = slots(several, front)
     left, sums = by_pixel.composed(several.shares, paints[several.owners])
     colours, weights = _shades(sums, left)
@@ -123,6 +122,16 @@ def _mostly_alone(fragments: Fragments, paints: IntArray, front: int, pixels: in
         none,
         none,
     )
+
+
+def _told_apart(fragments: Fragments, pixels: int) -> tuple[Fragments, Fragments]:
+    """Those that are alone in their pixel, and the others."""
+    every = np.arange(len(fragments), dtype=np.int32)
+    last = np.empty(pixels, np.int32)
+    last[fragments.pixels] = every
+    last[fragments.pixels[last[fragments.pixels] != every]] = -1
+    alone = last[fragments.pixels] >= 0
+    return fragments.only(np.flatnonzero(alone)), fragments.only(np.flatnonzero(~alone))
 
 
 def bands(size: Size) -> Iterator[tuple[int, Size]]:

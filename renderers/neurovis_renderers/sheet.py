@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import chain
 
 import numpy as np
@@ -45,6 +45,7 @@ Words = npt.NDArray[np.uint32]
 _WIDEST = 2.0
 
 
+@lru_cache(maxsize=4096)
 def packed(colour: str) -> int:
     """A colour as an integer of three lanes.
 
