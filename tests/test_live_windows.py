@@ -24,7 +24,7 @@ from test_live_server import Eyes, Live, served
 
 import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.layout.model import LayoutRefusalError
+from neurovis_spec.layout.model import RADIUS, LayoutRefusalError
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.commands import REQUESTS, Appearance, Draw, Fetch, Fit, PlaceNeuron, Save, Seek, Unplace, Write
 from neurovis_spec.live.desk import Desk, Written
@@ -79,6 +79,13 @@ def test_examples_are_laid_out_as_ever(spec: str, window: Window) -> None:
     found = placed(network, None, window)
     assert found.compiled is network
     assert found.layout is network.placed()
+
+
+def test_nothing_is_asked_where_a_window_is_filled_or_discs_are_as_large_as_they_are_drawn() -> None:
+    few, walk = nv.compile(SPECS / "hebbian.yaml").placed(), nv.compile(SPECS / "walk/walk.yaml").placed()
+    assert SHAPES["wide"].is_filled(few)
+    assert [SHAPES[window].is_filled(walk) for window in ("wide", "tall")] == [True, False]
+    assert SHAPES["wide"].scale(few) * RADIUS == 60
 
 
 @pytest.mark.parametrize(

@@ -20,26 +20,28 @@ Window: TypeAlias = Literal["tall", "default", "wide"]
 #: What is this much larger is clearly so; no layout is, where the network has this share of a room that it can have.
 _LARGER: Final = 1.1
 _FILLED: Final = 0.75
+#: The page draws no larger discs than of 60 pixels (room.js).
+_MOST: Final = 60.0 / RADIUS
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """The page that a network is laid out for, in pixels; and the rooms that it can have in such a window, in equal
-    units: where there are several curves stand beside it, or below it."""
+    """The page that a network is laid out for, and the rooms that it can have in such a window, in pixels: where there
+    are several curves stand beside it, or below it."""
 
     page: tuple[int, int]
     rooms: tuple[tuple[float, float], ...]
 
     def scale(self, layout: Layout) -> float:
-        """How many units of a room a unit of the layout has, where the whole is as large as can be."""
+        """How many pixels a unit of the layout has, where the whole is as large as it is drawn."""
         wide, high = _sides(layout)
-        return max(min(across / wide, down / high) for across, down in self.rooms)
+        return min(_MOST, max(min(across / wide, down / high) for across, down in self.rooms))
 
     def is_filled(self, layout: Layout) -> bool:
-        """Whether the network takes most of a room, so that no layout can be much larger in it."""
+        """Whether the network takes most of a room, or is as large as it can be, so that no layout is much larger."""
         wide, high = _sides(layout)
         ratios = [(across / wide, down / high) for across, down in self.rooms]
-        return any(min(both) >= _FILLED * max(both) for both in ratios)
+        return self.scale(layout) == _MOST or any(min(both) >= _FILLED * max(both) for both in ratios)
 
 
 #: By what a page says of its window; in others the network is laid out as anywhere. The rooms are those of a telephone
