@@ -26,7 +26,20 @@ import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout.model import RADIUS, LayoutRefusalError
 from neurovis_spec.live.access import Access
-from neurovis_spec.live.commands import REQUESTS, Appearance, Draw, Fetch, Fit, PlaceNeuron, Save, Seek, Unplace, Write
+from neurovis_spec.live.commands import (
+    REQUESTS,
+    Appearance,
+    Branch,
+    Compare,
+    Draw,
+    Fetch,
+    Fit,
+    PlaceNeuron,
+    Save,
+    Seek,
+    Unplace,
+    Write,
+)
 from neurovis_spec.live.desk import Desk, Written
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.live import Edited, Edits, listen
@@ -37,7 +50,7 @@ from neurovis_spec.live.saved_views import SavedView, keep, views_in
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show
 from neurovis_spec.live.view import View
-from neurovis_spec.live.windows import SHAPES, Window, fitted
+from neurovis_spec.live.windows import SHAPES, Window, fitted, is_free
 
 #: A fan that is wide as it is laid out anywhere, and can be high.
 FAN = """neurovis: 1
@@ -102,6 +115,13 @@ def test_who_says_how_a_network_is_laid_out_is_heard(more: str, tmp_path: Path) 
     network = compiled(FAN + more, tmp_path)
     for window in SHAPES:
         assert fitted(network, None, window) is None
+
+
+def test_large_networks_are_laid_out_once() -> None:
+    large = FAN.replace("count: 12", "count: 101").replace("{A -> N: 1}", "{N -> N: {weight: 1, pattern: all_to_all}}")
+    assert is_free(compiled(FAN))
+    assert is_free(compiled(large))
+    assert not is_free(compiled(large.replace("101", "150")))
 
 
 def test_given_places_are_heard() -> None:
@@ -213,6 +233,7 @@ def test_the_picture_is_that_of_the_window_that_was_asked_for_last(tmp_path: Pat
         assert saved[head:] == (tmp_path / "x.svg").read_bytes()
         assert live.fit("default") == "default"
         assert live.run.view.content == own.content, "as it began"
+        assert not any(one["undo"] for one in live.said if one["type"] == "placed"), "there is nothing to be undone"
 
 
 def test_the_picture_is_as_large_with_pathways_and_in_another_theme(tmp_path: Path) -> None:
@@ -276,10 +297,27 @@ def test_edits_keep_the_window(tmp_path: Path) -> None:
 def test_a_run_goes_on_to_where_it_was_sent(tmp_path: Path) -> None:
     with watched(tmp_path, playing=True) as live:
         live.run.ask(Seek(10_000))
+        live.done()
         assert live.fit("tall") == "tall"
         while live.run._running:
             live.done()
         assert live.run.shown().glance.step == 10_000
+
+
+def test_a_branch_beside_the_run_is_drawn_in_the_same_layout(tmp_path: Path) -> None:
+    with watched(tmp_path) as live:
+        for command in (Seek(20), Seek(5), Branch()):
+            live.run.ask(command)
+            live.done()
+            while live.run._running:
+                live.done()
+        (other,) = live.run.shown().status.futures.all
+        live.run.ask(Compare(other.number))
+        assert live.fit("tall") == "tall"
+        shown = live.run.shown()
+        assert shown.compared is not None
+        assert told(shown.view) == "tall", "that of both"
+        assert len(shown.status.futures.all) == 1
 
 
 def test_recordings_are_laid_out_for_a_window(tmp_path: Path) -> None:

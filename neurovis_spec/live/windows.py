@@ -20,6 +20,8 @@ Window: TypeAlias = Literal["tall", "default", "wide"]
 #: What is this much larger is clearly so; no layout is, where the network has this share of a room that it can have.
 _LARGER: Final = 1.1
 _FILLED: Final = 0.75
+#: With more neurons and connections a second layout would take too long beside a run.
+_MANY: Final = 20_000
 #: The page draws no larger discs than of 60 pixels (room.js).
 _MOST: Final = 60.0 / RADIUS
 
@@ -70,8 +72,11 @@ def fitted(compiled: Compilation, engine: str | None, window: Window) -> tuple[C
 
 
 def is_free(compiled: Compilation) -> bool:
-    """Whether nobody says how a network is laid out: no page, direction, place, or layout file."""
-    if compiled.network.render.size is not None or compiled.layout_file is not None:
+    """Whether nobody says how a network is laid out (page, direction, place, layout file), and it is small enough."""
+    network = compiled.network
+    if network.render.size is not None or compiled.layout_file is not None:
+        return False
+    if len(network.neurons) + len(network.connections) > _MANY:
         return False
     problem = compiled.problem
     return bool(problem.neurons) and not problem.places and replace(problem, aspect=1.0).turns
