@@ -1,4 +1,4 @@
-"""The page that is asked for chooses the direction: in `organic` and of pathways, as in `layered`."""
+"""The page that is asked for chooses the direction, in small networks, too: in `layered`, `organic`, of pathways."""
 
 from __future__ import annotations
 
@@ -26,11 +26,16 @@ def reach(folder: Path, text: str, size: tuple[int, int] | None, **options: obje
     """How far discs are apart to the side and down."""
     nv.compile_text(text).render(folder / "x.svg", step=0, size=size, **options)  # type: ignore[arg-type]
     found = re.findall(r'<circle[^>]* cx="([^"]*)" cy="([^"]*)"', (folder / "x.svg").read_text())
-    wide, high = np.ptp(np.array(found[-len(NAMES) :], float), axis=0)
+    count = len(NAMES) if options.get("view") else len(nv.compile_text(text).network.neurons)
+    wide, high = np.ptp(np.array(found[-count:], float), axis=0)
     return float(wide), float(high)
 
 
-CASES = {"organic": (LINE, {"engine": "organic"}), "pathways": (GROUPS, {"view": "pathways"})}
+CASES = {
+    "layered": (LINE, {}),
+    "organic": (LINE, {"engine": "organic"}),
+    "pathways": (GROUPS, {"view": "pathways"}),
+}
 
 
 @pytest.mark.parametrize("kind", CASES)
@@ -50,6 +55,15 @@ def test_without_a_page_and_with_a_direction_they_run_as_ever(tmp_path: Path, ki
     for spec, size in ((text, None), (f"{text}layout: {{direction: down}}\n", WIDE)):
         wide, high = reach(tmp_path, spec, size, **options)
         assert high > wide
+
+
+def test_a_small_network_fits_the_page_that_is_asked_for(tmp_path: Path) -> None:
+    text = LINE.replace(", ".join(f"{name}: {{}}" for name in NAMES[3:]), "").split("  n2 ->")[0].replace(", }", "}")
+    assert nv.compile_text(text).network.neurons.names == tuple(NAMES[:3])
+    wide, high = reach(tmp_path, text, WIDE)
+    assert wide > 2 * high
+    wide, high = reach(tmp_path, text, None)
+    assert high > 2 * wide
 
 
 def test_pins_and_an_earlier_layout_hold_the_direction() -> None:

@@ -85,7 +85,13 @@ def test_a_network_is_laid_out_for_a_window_in_which_it_is_larger_so() -> None:
     assert placed(network).layout is network.placed()
 
 
-@pytest.mark.parametrize("spec", ["mlp.yaml", "ring.yaml", "cpg_rbf.yaml", "walk/walk.yaml", "worm/worm.yaml"])
+def test_a_small_network_runs_along_a_wide_window() -> None:
+    network = nv.compile(SPECS / "mlp.yaml")
+    assert placed(network, None, "wide").layout.direction == "right"
+    assert placed(network, None, "tall").layout is network.placed()
+
+
+@pytest.mark.parametrize("spec", ["hebbian.yaml", "ring.yaml", "cpg_rbf.yaml", "walk/walk.yaml", "worm/worm.yaml"])
 @pytest.mark.parametrize("window", ["tall", "wide"])
 def test_examples_are_laid_out_as_ever(spec: str, window: Window) -> None:
     network = nv.compile(SPECS / spec)

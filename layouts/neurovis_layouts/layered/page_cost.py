@@ -28,7 +28,7 @@ _CROSSING = 4.0
 _CROSSED = 2.0
 #: To run back against the direction of ranks (with 8: a chain of thirty neurons stands in eight bands).
 _BACK = 15.0
-#: What is no longer than this, in units of the layout, may have any proportions.
+#: What is no longer than this, in units of the layout, may have any proportions, unless a page is asked for.
 _SMALL = 8.0
 #: Of more lines than so many no crossings are counted.
 _MOST_LINES = 300
@@ -40,6 +40,7 @@ class PageCost:
 
     def __init__(self, problem: LayoutProblem, lines: Sequence[tuple[int, int]], directed: bool) -> None:
         self._problem, self._directed = problem, directed
+        self._shaped = problem.aspect is not None
         self._lines: IntArray = np.array(lines, dtype=np.int64).reshape(-1, 2)
         self._apart = _unrelated(self._lines)
 
@@ -52,7 +53,7 @@ class PageCost:
         met = min(_CROSSING * _crossings(lines, *self._apart), _CROSSED * length)
         back = int((lines[:, 0, 1] > lines[:, 1, 1]).sum())
         met += _BACK * back if self._directed else _CROSSING * _run_over(lines, centres)
-        page = math.sqrt(stretched(self._problem, wide, high)) if max(wide, high) > _SMALL else 1.0
+        page = math.sqrt(stretched(self._problem, wide, high)) if self._shaped or max(wide, high) > _SMALL else 1.0
         return (_SIDE * math.sqrt(wide * high) + length + met) * page
 
 
