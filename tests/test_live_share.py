@@ -159,7 +159,7 @@ def test_a_view_is_saved_by_name_and_gone_to_in_windows_of_other_sizes(tmp_path:
             (saved,) = views_in(file, desk.placed.compiled.network, findings).values()
             assert not findings.sorted()
             assert (saved.step, saved.speed, saved.theme, saved.closed) == (step, "2", "", ())
-            assert saved.camera is not None
+            assert isinstance(saved.camera, tuple)
             assert saved.curves == ("O over T", "C1 with K2", "rms(T - O, last=9)")
 
             await opened.key("0")
@@ -216,6 +216,7 @@ def test_a_view_of_the_matrix_or_of_pathways_is_kept_called_otherwise_and_delete
                 await opened.ask("document.querySelector('#keep').requestSubmit()")
                 await opened.until(f"{there}.split(',').includes('{name}')")
 
+            curves = str(await opened.ask(f"{CURVES}.join()"))
             await keep("plain")
             await opened.ask("document.querySelector('#matrix').click()")
             await keep("weights")
@@ -226,8 +227,27 @@ def test_a_view_of_the_matrix_or_of_pathways_is_kept_called_otherwise_and_delete
             for number, wanted in ((1, "matrix"), (2, "pathways"), (0, ""), (1, "matrix")):
                 await opened.ask(f"document.querySelectorAll('#views .go')[{number}].click()")
                 await opened.until(f"{shown} == '{wanted}'")
+                if number == 0:
+                    await opened.until(f"{CURVES}.join() == {json.dumps(curves)}")
+                    assert await opened.ask("document.querySelector('#refusal').textContent") == ""
             await opened.ask(undo)
             await opened.until(f"{shown} == ''")
+            await opened.ask(f"document.querySelectorAll('#views .go')[2].click(); {undo}")  # before it is there
+            await opened.ask("new Promise((done) => setTimeout(done, 1500))")
+            assert await opened.ask(shown) == ""
+
+            await opened.ask(press.format("rename ways"))
+            await opened.ask("document.activeElement.value = 'plain'")
+            await opened.key("Enter")
+            await opened.until("document.querySelector('#refusal').textContent.includes('another view is called')")
+            await opened.ask(press.format("rename ways"))
+            await opened.ask("document.activeElement.value = 'half'")
+            file_beside(spec).write_text(file_beside(spec).read_text() + "# edited\n")
+            await opened.ask("new Promise((done) => setTimeout(done, 800))")
+            assert await opened.ask("document.activeElement.value") == "half"
+            assert "half" not in file_beside(spec).read_text()
+            await opened.key("Escape")
+            await opened.until(f"{there} == 'plain,weights,ways'")
 
             await opened.ask(press.format("rename weights"))
             await opened.ask("document.activeElement.value = ' of  numbers'")
@@ -236,13 +256,14 @@ def test_a_view_of_the_matrix_or_of_pathways_is_kept_called_otherwise_and_delete
             await opened.ask(press.format("delete plain"))
             await opened.until(f"{there} == 'of numbers,ways'")
             await opened.ask(undo)
-            await opened.until(f"{there} == 'of numbers,ways,plain'")
+            await opened.until(f"{there} == 'plain,of numbers,ways'")
             await opened.ask(undo)
-            await opened.until(f"{there} == 'weights,ways,plain'")
+            await opened.until(f"{there} == 'plain,weights,ways'")
             findings = Findings()
             found = views_in(file_beside(spec), nv.compile(spec).network, findings)
+            assert found["plain"].camera == "whole"
             assert [(name, one.shows) for name, one in found.items()] == [
-                ("weights", "matrix"), ("ways", "pathways"), ("plain", "network")
+                ("plain", "network"), ("weights", "matrix"), ("ways", "pathways")
             ]  # fmt: skip
 
     asyncio.run(main())

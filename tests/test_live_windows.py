@@ -441,6 +441,7 @@ def test_a_network_that_is_wide_is_high_on_a_telephone_and_wide_again_when_that_
             (tmp_path / "tall.png").write_bytes(await page.shot())
             await page.size(400, 860)
             await page.until("picture.clientWidth == 400")
+            await page.ask("document.querySelector('#scrub').focus()")
             await page.size(1280, 800)
             await page.until("picture.clientWidth > 900")
             while told(run.view) != "default":
@@ -449,6 +450,65 @@ def test_a_network_that_is_wide_is_high_on_a_telephone_and_wide_again_when_that_
             await shows(page, own)
 
     asyncio.run(asyncio.wait_for(main(), 240))
+
+
+def test_who_asks_is_told_for_which_window_it_is_laid_out_where_nothing_changes(tmp_path: Path) -> None:
+    with watched(tmp_path) as live:
+        asked = json.loads(live.ask(Fit("default")))
+        assert asked == {"type": "fitting", "window": None, "shown": "default"}
+        assert live.fit("tall") == "tall"
+        assert [one["shown"] for one in live.said if one["type"] == "fitting"] == ["default", "tall"]
+        name = next(iter(live.desk.placed.layout.positions))
+        live.desk.ask(PlaceNeuron(name, (30.0, 30.0), True), lambda _: None)
+        assert json.loads(live.ask(Fit("wide"))) == {"type": "fitting", "window": None, "shown": "tall"}
+
+
+def test_a_layout_that_nobody_wants_any_more_is_not_shown(tmp_path: Path) -> None:
+    with watched(tmp_path) as live:
+        own, shown = live.run.view, []
+        for window in ("tall", "default"):
+            live.desk.ask(Fit(window), lambda _: None)
+        assert live.settled() == "default"
+        shown.append(live.run.view)
+        assert shown == [own]
+        assert live.last("fitting") is None
+
+
+@pytest.mark.browser
+def test_a_page_that_connects_again_stays_as_it_is(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with opened(tmp_path, FAN) as (page, access, run):
+            await page.size(390, 844)
+            await page.call("Page.addScriptToEvaluateOnNewDocument", source=SOCKETS)
+            await page.call("Page.navigate", url=access.url())
+            while told(run.view) != "tall":
+                await asyncio.sleep(0.1)
+            await shows(page, run.view)
+            await page.ask("document.querySelector('#picture').focus()")
+            await page.key("+")
+            await page.until("location.hash.includes('view=') && location.hash.includes('window=tall')")
+            link = str(await page.ask("location.href"))
+            await page.call("Page.navigate", url="about:blank")
+            await page.size(1280, 800)
+            await page.call("Page.navigate", url=link)
+            await page.until(f"{STEP} > 3 && location.hash.includes('view=') && location.hash.includes('window=tall')")
+            assert told(run.view) == "tall"
+            await page.ask("asked.length = 0; sockets.forEach((one) => one.close())")
+            await page.until("sockets.length == 2 && asked.some((one) => one.includes('look'))", 30)
+            await page.ask("new Promise((done) => setTimeout(done, 1000))")
+            assert not await page.ask("asked.some((one) => one.includes('fit'))")
+            assert await page.ask("location.hash.includes('view=') && location.hash.includes('window=tall')")
+
+    asyncio.run(asyncio.wait_for(main(), 240))
+
+
+#: Notes the sockets of a page and what it sends.
+SOCKETS = """
+window.sockets = []; window.asked = [];
+window.WebSocket = class extends WebSocket {
+  constructor(...of) { super(...of); sockets.push(this); }
+  send(data) { if (typeof data === 'string') asked.push(data); super.send(data); }
+};"""
 
 
 @pytest.mark.browser

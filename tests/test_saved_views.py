@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-import math
+from dataclasses import replace
 from pathlib import Path
+from queue import SimpleQueue
 from typing import get_args
 
 import pytest
@@ -17,8 +18,13 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.diagnostics import Findings, SpecError
 from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.commands import Keep, Rekeep, Unkeep
+from neurovis_spec.live.desk import Desk, Written
 from neurovis_spec.live.protocol import ProtocolError, command_of, views_message
+from neurovis_spec.live.run import Run
 from neurovis_spec.live.saved_views import SHOWN, SavedView, call, file_beside, forget, keep, views_in
+from neurovis_spec.live.show import Show
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.view import view_of
 from neurovis_spec.live.windows import Window
 
 TEXT = """neurovis: 1
@@ -36,7 +42,7 @@ views = st.builds(
     SavedView,
     step=st.integers(0, 1 << 53).map(lambda step: step - 1 if step else step),
     speed=st.sampled_from([*SPEEDS]),
-    camera=st.none() | st.tuples(st.floats(0.01, 64), numbers, numbers),
+    camera=st.sampled_from([None, "whole"]) | st.tuples(st.floats(0.01, 64), numbers, numbers),
     curves=st.lists(st.sampled_from(CURVES), max_size=4).map(tuple),
     theme=st.sampled_from(["", "dark", "default", "print"]),
     closed=st.lists(texts, max_size=3).map(tuple),
@@ -68,6 +74,7 @@ STYLES = {
     "block": "neurovis_view: 1\nviews:\n  # of mine\n  mine: {step: 3} # why\n  other:\n    step: 4 # four\n# last\n",
     "braces": "neurovis_view: 1\nviews: {mine: {step: 3}, other: {step: 4}} # last\n",
     "lines": "neurovis_view: 1\nviews: {\n  # of mine\n  mine: {step: 3}, # why\n  other: {step: 4},\n}\n# last\n",
+    "commas": "neurovis_view: 1\nviews: {\n  mine: {step: 3} # a, b\n  , other: {step: 4} # c, d\n}\n# last, too\n",
 }
 
 
@@ -106,7 +113,41 @@ def test_a_view_is_called_otherwise_or_taken_out_and_all_else_stays(
         findings = Findings()
         assert views_in(path, NETWORK, findings) == wanted
         assert findings.sorted() == ()
-    assert "# last" in path.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    assert "# last" in text
+    assert style != "commas" or ("# a, b" in text and "# c, d" in text)
+
+
+def test_a_view_that_is_put_back_stands_where_it_was_and_as_it_was(tmp_path: Path) -> None:
+    """With what was said of it, and what nobody knows; not where the file was edited meanwhile."""
+    spec, told = tmp_path / "x.yaml", SimpleQueue[str]()
+    spec.write_text(TEXT)
+    network = nv.compile(spec)
+    run = Run(SimulatedSource(network.simulator()), view_of(network, network.gains), lambda _: None)
+    desk = Desk(network, None, Show().view, run, told.put, Written(spec, nv.compile_text))
+    path = file_beside(spec)
+    before = "neurovis_view: 1\nviews:\n  a: {step: 3, curves: [A1, gone], more: 1} # why\n  b: {step: 4}\n"
+    path.write_text(before)
+    desk.start()
+
+    def asked(request: Unkeep | Keep) -> None:
+        desk.ask(request, lambda reason: pytest.fail(str(reason)))
+        known = None
+        while known is None or ("a" in known) != isinstance(request, Keep):
+            message = json.loads(told.get(timeout=30))
+            known = message.get("views")
+
+    try:
+        asked(Unkeep("a"))
+        assert "why" not in path.read_text()
+        asked(Keep("a", SavedView(3, curves=("A1",))))
+        assert path.read_text() == before
+        asked(Unkeep("a"))
+        path.write_text(path.read_text().replace("step: 4", "step: 5"))
+        asked(Keep("a", SavedView(3, curves=("A1",))))
+        assert path.read_text().splitlines()[2:] == ["  b: {step: 5}", "  a:", "    step: 3", "    curves: [A1]"]
+    finally:
+        desk.end()
 
 
 def test_a_view_without_some_keys_is_put_back_without_them(tmp_path: Path) -> None:
@@ -185,7 +226,9 @@ def test_a_page_sends_all_of_a_view_and_is_told_all_of_them() -> None:
             command_of(message(**wrong))
     with pytest.raises(ProtocolError):
         command_of(json.dumps({"type": "keep", "name": " ", "view": view}))
-    assert math.isfinite(wanted.camera[0] if wanted.camera else 0.0)
+    assert command_of(message(camera="whole")) == Keep("a b", replace(wanted, camera="whole"))
+    long = json.dumps({"type": "keep", "name": 200 * "x", "view": view})
+    assert command_of(long) == Keep(200 * "x", wanted), "an author may write a longer name than a page has typed"
 
 
 def test_a_view_that_is_not_there_or_a_file_that_is_wrong_is_told_before_anything_is_served(tmp_path: Path) -> None:

@@ -45,13 +45,13 @@ from neurovis_spec.live.protocol import (
     views_message,
 )
 from neurovis_spec.live.run import Run, Stage
-from neurovis_spec.live.saved_views import call, file_beside, forget, keep, views_in
+from neurovis_spec.live.saved_views import Forgotten, SavedView, call, file_beside, forget, keep, restore, views_in
 from neurovis_spec.live.saving import film, picture, recording, steps_for, told_by
 from neurovis_spec.live.source import Source, SourceError
 from neurovis_spec.live.turns import Turned
 from neurovis_spec.live.view import View
 from neurovis_spec.live.watch import Watch
-from neurovis_spec.live.windows import Window
+from neurovis_spec.live.windows import Window, window_of
 from neurovis_spec.live.with_events import WithEvents, with_events, without
 from neurovis_spec.progress import Progress
 
@@ -114,6 +114,9 @@ class Desk:
         self._wake, self._work_lock = Condition(), RLock()
         self._ended = False
         self._thread = Thread(target=self._work, name="live desk", daemon=True)
+        #: the saved views as they were told, and what was taken out of their file, by names
+        self._known: dict[str, SavedView] = {}
+        self._forgotten: dict[str, tuple[SavedView | None, Forgotten]] = {}
         #: has the views be read again when anybody has edited their file
         self._watch = None if spec is None else Watch({file_beside(spec.path)}, self._edited)
 
@@ -220,14 +223,15 @@ class Desk:
                 self._write(answer)
             case Fit():
                 self._window = request.window
-                self._fit()
+                self._fit(answer)
             case _Fitted():
                 self._take(request)
             case Keep():
-                keep(self._views(), request.name, request.view)
+                self._keep(request)
                 self._say_views()
             case Unkeep():
-                forget(self._views(), request.name)
+                known = self._known.get(request.name)
+                self._forgotten[request.name] = known, forget(self._views(), request.name)
                 self._say_views()
             case Rekeep():
                 call(self._views(), request.name, request.to)
@@ -332,10 +336,13 @@ class Desk:
         self._run.change(change, lambda reason: answer(refused_message(reason)))
         self._say()
 
-    def _fit(self) -> None:
+    def _fit(self, answer: Answer | None = None) -> None:
         """Have the network laid out for the window, beside the desk, if it is not; what was put by hand stays."""
         before, window = self._placed, self._window
-        if self._fitting or window == before.window or before.moved or self._before:
+        if self._fitting:
+            return
+        if window == before.window or before.moved or self._before:
+            (answer or _nobody)(self._fitted())
             return
         self._fitting = True
 
@@ -350,24 +357,35 @@ class Desk:
                 _LOG.error("the network cannot be laid out for a window", exc_info=error)
             self._put(made)
 
-        self._tell(fitting_message(window))
+        self._tell(fitting_message(window, window_of(before.compiled)))
         Thread(target=lay_out, name="live fitting", daemon=True).start()
 
     def _take(self, made: _Fitted) -> None:
         """Show the network as it was laid out for a window, if it is the one that is shown."""
         self._fitting = False
-        if self._placed is made.before and not self._before:
+        if self._placed is made.before and not self._before and made.after.window == self._window:
             self._placed = made.after
             if made.view is not None:
                 self._show(_nobody, made.view)
-        self._tell(fitting_message(None))
         self._fit()
+        if not self._fitting:
+            self._tell(self._fitted())
+
+    def _fitted(self) -> str:
+        """That nothing is being laid out for a window, and for which the network is that is shown."""
+        return fitting_message(None, window_of(self._placed.compiled))
+
+    def _keep(self, request: Keep) -> None:
+        """Put a view into its file; one that was taken out as it was, where nothing else has changed since."""
+        known, forgotten = self._forgotten.pop(request.name, (None, None))
+        if known != request.view or forgotten is None or not restore(self._views(), forgotten):
+            keep(self._views(), request.name, request.view)
 
     def _say_views(self) -> None:
         """Tell everybody which views are saved, where they can be."""
         if self._spec is not None:
             path, findings = file_beside(self._spec.path), Findings()
-            views = views_in(path, self._placed.compiled.network, findings)
+            views = self._known = views_in(path, self._placed.compiled.network, findings)
             self._tell(views_message(path.name, views, show_text(findings.sorted(), findings.sources)))
 
     def _edited(self) -> Iterable[Path]:

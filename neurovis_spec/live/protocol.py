@@ -315,9 +315,9 @@ def making_message(done: int, total: int) -> str:
     return _text("making", done=done, total=total)
 
 
-def fitting_message(window: Window | None) -> str:
-    """For which window the network is being laid out; None: for none any more."""
-    return _text("fitting", window=window)
+def fitting_message(window: Window | None, shown: Window) -> str:
+    """For which window the network is being laid out, None for none any more, and for which it is that is shown."""
+    return _text("fitting", window=window, shown=shown)
 
 
 def refused_message(reason: str) -> str:
@@ -504,7 +504,9 @@ def _view(value: object) -> SavedView:
     return made(**{name: None if value.get(name) is None else check(value[name]) for name, check in checks.items()})
 
 
-def _camera(value: object) -> tuple[float, float, float]:
+def _camera(value: object) -> tuple[float, float, float] | str:
+    if value == "whole":
+        return "whole"
     if not isinstance(value, list) or len(value) != 3:
         raise ProtocolError("a camera is wanted")
     zoom, x, y = (_number(number) for number in value)
@@ -520,7 +522,7 @@ def _texts(value: object) -> tuple[str, ...]:
 
 
 def _view_name(value: object) -> str:
-    name = _called(value)
+    name = " ".join(_name(value).split())
     if not name:
         raise ProtocolError("a name is wanted")
     return name

@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, cast, get_args
+from typing import Final, Literal, cast, get_args
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings, Span
@@ -52,14 +52,14 @@ _JOINING: Final = re.compile(r" (?:over|with|against) ")
 @dataclass(frozen=True, slots=True)
 class SavedView:
     """Where a page stood: its ``step``, its ``speed`` (a key of ``SPEEDS``), its ``camera`` (how many times as large as
-    the whole picture fits into the window; the units of the layout in the middle), its ``curves`` by what they show,
-    its ``theme`` ("" is that of the spec), the boxes that are ``closed`` by hand, and what it ``shows`` (one of
-    ``SHOWN``). What is None stays as it is; ``window`` is that for which the network was laid out, None for none: the
-    camera is of that."""
+    the whole picture fits into the window; the units of the layout in the middle; or ``whole``), its ``curves`` by what
+    they show, its ``theme`` ("" is that of the spec), the boxes that are ``closed`` by hand, and what it ``shows`` (one
+    of ``SHOWN``). What is None stays as it is; ``window`` is that for which the network was laid out, None for none:
+    the camera is of that."""
 
     step: int | None = None
     speed: str | None = None
-    camera: tuple[float, float, float] | None = None
+    camera: tuple[float, float, float] | Literal["whole"] | None = None
     curves: tuple[str, ...] | None = None
     theme: str | None = None
     closed: tuple[str, ...] | None = None
@@ -114,10 +114,28 @@ def keep(path: Path, name: str, view: SavedView) -> None:
         file.write(_with(text, views, name, view).encode())
 
 
-def forget(path: Path, name: str) -> None:
+@dataclass(frozen=True, slots=True)
+class Forgotten:
+    """The file before and after a view was taken out of it."""
+
+    before: bytes
+    after: bytes
+
+
+def forget(path: Path, name: str) -> Forgotten:
     """Take a view out of a file, which is written as a whole. Raises SpecError where what is there cannot be read,
     KeyError where there is no such view, OSError."""
-    _edit(path, name, lambda text: without(text, ("views", name)))
+    return _edit(path, name, lambda text: without(text, ("views", name)))
+
+
+def restore(path: Path, forgotten: Forgotten) -> bool:
+    """Have a file be as it was before a view was taken out of it; False where it has been edited since. Raises
+    OSError."""
+    if not path.exists() or path.read_bytes() != forgotten.after:
+        return False
+    with replacing(path) as file:
+        file.write(forgotten.before)
+    return True
 
 
 def call(path: Path, name: str, to: str) -> None:
@@ -127,7 +145,7 @@ def call(path: Path, name: str, to: str) -> None:
     _edit(path, name, lambda text: recalled(text, ("views", name), _text(to)), to)
 
 
-def _edit(path: Path, name: str, edited: Callable[[str], str], to: str | None = None) -> None:
+def _edit(path: Path, name: str, edited: Callable[[str], str], to: str | None = None) -> Forgotten:
     findings = Findings()
     root = _root(path, findings)
     findings.check()
@@ -136,9 +154,11 @@ def _edit(path: Path, name: str, edited: Callable[[str], str], to: str | None = 
         raise KeyError(f"there is no view '{name}' in {path.name}")
     if to is not None and to != name and views.entry(to) is not None:
         raise ValueError(f"another view is called '{to}'")
-    text = path.read_bytes().decode("utf-8-sig")
+    before = path.read_bytes()
+    after = edited(before.decode("utf-8-sig")).encode()
     with replacing(path) as file:
-        file.write(edited(text).encode())
+        file.write(after)
+    return Forgotten(before, after)
 
 
 def _check_seen(*texts: str) -> None:
@@ -261,7 +281,9 @@ def _one_of(node: Node | None, key: str, words: Mapping[str, object], findings: 
     return None
 
 
-def _camera(node: Node | None, findings: Findings) -> tuple[float, float, float] | None:
+def _camera(node: Node | None, findings: Findings) -> tuple[float, float, float] | Literal["whole"] | None:
+    if isinstance(node, Scalar) and node.value == "whole":
+        return "whole"
     found = [item.value for item in node.items if isinstance(item, Scalar)] if isinstance(node, AnyList) else []
     numbers = [float(one) for one in found if isinstance(one, int | float) and not isinstance(one, bool)]
     if len(numbers) == len(found) == 3 and all(map(math.isfinite, numbers)) and numbers[0] > 0:

@@ -294,6 +294,7 @@ def view_of(
     joined, bands = _bundles(planned)
     by_hand = {**declared(compiled), **ranges_of(drawn)}
     more = {**by_hand, **names, **begins, **bands, "themes": list(THEMES), "themed": themed}
+    more["pathways"] = appearance.pathways
     more["window"] = window_of(compiled)
     words = content(drawn.network, scene, rows, _constants(drawn, planned), more)
     otherwise = otherwise or partial(view_of, compiled, gains, theme, engine, layout=layout)

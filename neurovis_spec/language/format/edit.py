@@ -26,8 +26,8 @@ Value: TypeAlias = "str | tuple[str, ...]"
 _Tree: TypeAlias = "dict[str, _Tree | Value]"
 
 _STEP: Final = 2
-#: The comma behind an entry in braces.
-_COMMA: Final = re.compile(r"[ \n]*,")
+#: The comma behind an entry in braces, and comments before it.
+_COMMA: Final = re.compile(r"(?:[ \n]|#[^\n]*\n)*,")
 
 
 class _Edit(NamedTuple):
@@ -80,13 +80,13 @@ def without(text: str, path: Path) -> str:
     source, node, entry = _found(plain, path)
     begin, end = source.begin(entry.key), source.end(entry.value)
     if source.is_block(node):
-        begin, end = plain.rfind("\n", 0, begin) + 1, plain.index("\n", end) + 1
-    elif comma := _COMMA.match(plain, end):
-        end = comma.end()
-    elif len(node.entries) > 1:  # the last one goes with the comma before it
-        comma_at = plain.index(",", source.end(node.entries[-2].value))
-        plain, begin, end = plain[:comma_at] + plain[comma_at + 1 :], begin - 1, end - 1
-    return format_read(plain[:begin] + plain[end:])
+        return format_read(plain[: plain.rfind("\n", 0, begin) + 1] + plain[plain.index("\n", end) + 1 :])
+    at = node.entries.index(entry)
+    comma = _COMMA.match(plain, end) or (_COMMA.match(plain, source.end(node.entries[at - 1].value)) if at else None)
+    cut = sorted([(begin, end), *([] if comma is None else [(comma.end() - 1, comma.end())])])
+    for first, last in reversed(cut):
+        plain = plain[:first] + plain[last:]
+    return format_read(plain)
 
 
 def recalled(text: str, path: Path, name: str) -> str:

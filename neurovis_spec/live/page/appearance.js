@@ -46,7 +46,10 @@ export class Appearance {
     this.chosen = recall(THEME) || '';
     this.owner = false;
     this.isDark = matchMedia('(prefers-color-scheme: dark)');
-    const ask = (/** @type {object} */ more) => link.ask('draw', { ...this.shown, ...more });
+    const ask = (/** @type {object} */ more) => {
+      this.shown = { ...this.shown, ...more };
+      link.ask('draw', this.shown);
+    };
     this.ask = ask;
     theme.onchange = () => this.choose(theme.value);
     this.isDark.onchange = () => this.dress();
@@ -96,6 +99,11 @@ export class Appearance {
 
   /** Draw each group as one node, or each neuron again. */
   toggle() {
-    if (this.owner) this.ask({ pathways: !this.shown.pathways });
+    this.have(!this.shown.pathways);
+  }
+
+  /** Draw each group as one node, or each neuron. @param {boolean} pathways */
+  have(pathways) {
+    if (this.owner) this.ask({ pathways });
   }
 }

@@ -241,12 +241,13 @@ const link = new Link({
       measuring.take(message);
       views.measured(message);
     } else if (message.type === 'views') views.take(message);
-    else if (message.type === 'fitting') fitting.told(message.window);
+    else if (message.type === 'fitting') fitting.told(message.window, message.shown);
     else if (message.type === 'making') share.making(message.done, message.total);
     else if (message.type === 'refused') {
       share.made();
       refusal.tell(message.reason);
       undo.refused();
+      views.refused();
       if (placing.waiting) placing.cancel();
     }
   },
@@ -285,7 +286,9 @@ const aside = new Aside(link, part, () => {
 const branches = new Branches(link, part, undo, (number, name) => strips.compare(number, name));
 const measuring = new Measuring(link, strips, part);
 const body = new Body(part('embodied'), part('posed'), part('bodily'), part('spatial'), redraw);
-const fitting = new Fitting(link, part('shown'), part('fitting'));
+const fitting = new Fitting(link, part('shown'), part('fitting'), () =>
+  refusal.tell('the part that was seen is of another layout of the network than the one that is shown'),
+);
 const share = new Share(link, camera, strips, attention, controls, body, redraw, part, branches, fitting, (words) =>
   refusal.tell(words),
 );

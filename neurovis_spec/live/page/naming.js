@@ -2,7 +2,7 @@
  * Naming: a field in the place of what is to be called otherwise.
  */
 
-/** Have a name typed; Enter, or leaving the field, is meant, Escape is not.
+/** Have a name typed; Enter, or leaving the field, is meant, Escape is not. What it stands in is not to be made anew meanwhile.
  * @param {HTMLElement} place @param {string} name what it is called by now @param {string} label
  * @param {(name: string | null) => void} done called with the new name, null where nothing is called otherwise */
 export function retype(place, name, label, done) {

@@ -25,7 +25,7 @@ import { isStill } from './camera.js';
  *   time: {step: number, unit: string} | null, discs: number, lines: number, parameters: Declared[],
  *   ranges: [number | null, number | null, number][], ranged: number[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
- *   themed: boolean, window: string, named: string[][], names: number[], curves: Curve[], beside: {inputs: string[], sensors: string[], words: string[]}, order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
+ *   themed: boolean, pathways: boolean, window: string, named: string[][], names: number[], curves: Curve[], beside: {inputs: string[], sensors: string[], words: string[]}, order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
  *   told: string[], boxes: Object<string, number[]>, bundles: Bundles, groups: Group[]}} Scene */
 /** Signals in one axis, by what they are asked for, the first in front, and their names.
  * @typedef {{items: string[], names: string[]}} Curve */
@@ -57,11 +57,11 @@ import { isStill } from './camera.js';
  *   learning: Object<string, boolean | null>, turned: Turned[], copied: string, events: number[], appearance: Gains, backend: string, futures: Future[], dropped: number, current: number, branch: string, compared: number | null, measures: {number: number, text: string}[], loop: number[] | null}} Status */
 /** What is not finite: the first, since which step, or an earlier one that is not known, and how many are; '' where nothing is.
  * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
-/** Where a page stood; null of what it says nothing. @typedef {{step: number | null, speed: string | null, camera: number[] | null, curves: string[] | null,
+/** Where a page stood; null of what it says nothing. @typedef {{step: number | null, speed: string | null, camera: number[] | 'whole' | null, curves: string[] | null,
  *   theme: string | null, closed: string[] | null, shows: string | null, window: string | null}} SavedView */
 /** @typedef {Status | {type: 'views', file: string, views: Object<string, SavedView>, findings: string} | {type: 'values', step: number, values: Object<string, number | null>, other: Object<string, number | null>}
  *   | {type: 'body', skeleton: Skeleton | null, start: number[], motors: Motor[]}
- *   | {type: 'fitting', window: string | null}
+ *   | {type: 'fitting', window: string | null, shown: string}
  *   | {type: 'making', done: number, total: number}
  *   | {type: 'findings', text: string, errors: boolean}
  *   | Nonfinite

@@ -173,17 +173,21 @@ export class Share {
     this.strips.only(pinned);
   }
 
+  /** Whether the whole picture is seen. @returns {boolean} */
+  get isWhole() {
+    const { zoom, shift } = this.camera;
+    return zoom === 1 && shift.every((one) => Math.abs(one) < HALF);
+  }
+
   /** What an address says of this page. @returns {string} */
   state() {
-    const { camera, controls, link } = this,
+    const { controls, link } = this,
       said = new URLSearchParams(),
       curves = this.curves();
     if (!controls.playing && link.look) said.set('step', String(link.look.step));
     if (!controls.playing || this.branches.isSeveral) said.set('branch', String(this.branches.current));
     if (controls.speed.value !== '1') said.set('speed', controls.speed.value);
-    const isWhole =
-      this.matrix.getAttribute('aria-pressed') === 'true' ||
-      (camera.zoom === 1 && camera.shift.every((one) => Math.abs(one) < HALF));
+    const isWhole = this.matrix.getAttribute('aria-pressed') === 'true' || this.isWhole;
     if (!isWhole) said.set('view', this.seen().join(' '));
     if (!isWhole && this.window !== USUAL) said.set('window', this.window);
     if (curves !== this.begun) said.set('curves', curves);

@@ -15,7 +15,7 @@ import { say } from './say.js';
 /** A turn as it was asked for, until the status tells it; by `act` it is done again. @typedef {{asked: Asked, gesture: number, act: Act | null}} Pending */
 
 /** What has an undo of its own. */
-const WRITTEN = 'textarea, input:not([type=range], [type=checkbox])';
+export const WRITTEN = 'textarea, input:not([type=range], [type=checkbox])';
 /** The most acts that are kept. */
 const MOST = 200;
 /** The messages that are turns. */

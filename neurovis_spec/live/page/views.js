@@ -20,6 +20,9 @@ const JOINING = / (over|with|against) /;
 const LONGEST = 500,
   LARGEST = 12000;
 
+/** A name as the file has it. @param {string} name @returns {string} */
+const spaced = (name) => name.trim().replaceAll(/\s+/g, ' ');
+
 /** The views that are saved. */
 export class Views {
   /** @param {Share} share @param {Zoom} zoom @param {Appearance} appearance @param {Undo} undo @param {() => void} redraw
@@ -34,15 +37,18 @@ export class Views {
     this.list = part('views');
     this.found = part('viewsfound');
     this.owner = false;
-    /** what is to be seen in the next scene @type {number[] | null} */
-    this.next = null;
+    /** a view of another picture than the one that is shown: the rest of it waits for that @type {SavedView | null} */
+    this.later = null;
+    /** the one that is being named */
+    this.naming = '';
+    /** what was asked of the file: an act as soon as it is told to be so, by which is seen that it is
+     * @type {{act: import('./undo.js').Act, isDone: (all: Object<string, SavedView>) => boolean, words: string} | null} */
+    this.pending = null;
     /** by their names; null until they are told @type {Object<string, SavedView> | null} */
     this.all = null;
     this.file = '';
     /** the one that is to be gone to as soon as they are told */
     this.wanted = '';
-    /** the one that is being saved */
-    this.saving = '';
     /** curves that wait for measures, and for which, by their texts @type {{curves: string[], texts: Set<string>} | null} */
     this.waiting = null;
     const field = /** @type {HTMLInputElement} */ (part('viewname'));
@@ -55,8 +61,7 @@ export class Views {
         share.tell('too many curves and closed boxes for a view');
         return;
       }
-      this.saving = name;
-      share.link.ask('keep', { name, view });
+      this.save(name, view);
       field.value = '';
     };
     share.opens = (name) => this.open(name);
@@ -77,15 +82,45 @@ export class Views {
     this.found.textContent = findings;
     this.found.hidden = !findings;
     this.rows();
-    if (this.saving && Object.hasOwn(views, this.saving)) {
-      this.undo.tell(`saved ${this.saving} in ${file}`);
-      this.saving = '';
+    if (this.pending?.isDone(views)) {
+      this.undo.act(this.pending.act);
+      this.undo.tell(this.pending.words);
+      this.pending = null;
     }
     if (this.wanted) this.open(this.wanted);
   }
 
+  /** What was asked is not done. */
+  refused() {
+    this.pending = null;
+  }
+
+  /** Ask for something of the file, which can be undone as soon as it is told to be so. @param {string} words
+   * @param {(all: Object<string, SavedView>) => boolean} isDone @param {() => void} redo @param {() => void} undo */
+  ask(words, isDone, redo, undo) {
+    this.pending = { act: { words, undo, redo }, isDone, words };
+    redo();
+  }
+
+  /** Save a view, in place of one that is called so. @param {string} typed @param {SavedView} view */
+  save(typed, view) {
+    const { link } = this.share,
+      name = spaced(typed),
+      before = this.all?.[name],
+      keep = (/** @type {SavedView} */ one) => () => link.ask('keep', { name, view: one });
+    this.ask(
+      `saved ${name} in ${this.file}`,
+      (all) => Object.hasOwn(all, name),
+      keep(view),
+      before ? keep(before) : () => link.ask('unkeep', { name }),
+    );
+  }
+
   /** List them. */
   rows() {
+    if (this.naming && this.all && Object.hasOwn(this.all, this.naming)) return;
+    this.naming = '';
+    const focused = this.list.contains(document.activeElement);
     const rows = Object.entries(this.all ?? {}).map(([name, view]) => {
       const row = document.createElement('li'),
         go = button(name, '', () => this.go(name));
@@ -101,27 +136,32 @@ export class Views {
       return row;
     });
     this.list.replaceChildren(...rows);
+    if (focused) (this.list.querySelector('button') || this.form.querySelector('input'))?.focus();
   }
 
   /** Have a view be called otherwise, in its place. @param {string} name @param {HTMLElement} place */
   rename(name, place) {
+    this.naming = name;
     retype(place, name, 'name of the view', (typed) => {
-      const to = (typed ?? '').trim().replaceAll(/\s+/g, ' '),
+      const to = spaced(typed ?? ''),
         call = (/** @type {string} */ from, /** @type {string} */ called) => () =>
           this.share.link.ask('rekeep', { name: from, to: called });
-      if (to && to !== name) this.undo.whole({ words: `view named ${to}`, undo: call(to, name), redo: call(name, to) });
+      this.naming = '';
+      this.rows();
+      if (to && to !== name)
+        this.ask(`view named ${to}`, (all) => Object.hasOwn(all, to), call(name, to), call(to, name));
     });
   }
 
   /** Take a view out of the file. @param {string} name @param {SavedView} view */
   forget(name, view) {
     const { link } = this.share;
-    this.undo.whole({
-      words: `deleted the view ${name}`,
-      undo: () => link.ask('keep', { name, view }),
-      redo: () => link.ask('unkeep', { name }),
-    });
-    this.undo.tell(`deleted the view ${name}`);
+    this.ask(
+      `deleted the view ${name}`,
+      (all) => !Object.hasOwn(all, name),
+      () => link.ask('unkeep', { name }),
+      () => link.ask('keep', { name, view }),
+    );
   }
 
   /** The page was opened with a view. @param {string} name */
@@ -151,7 +191,7 @@ export class Views {
     return {
       step: share.link.look?.step ?? 0,
       speed: share.controls.speed.value,
-      camera: this.asMatrix() ? null : this.units(share.seen(), false),
+      camera: this.asMatrix() ? null : share.isWhole ? 'whole' : this.units(share.seen(), false),
       curves: share.strips.pinned.map((strip) => {
         const [first, ...behind] = [strip.key, ...strip.behind].map((key) => this.named(key));
         const more = strip.joined.map(({ key }) => ` with ${this.named(key)}`);
@@ -161,7 +201,7 @@ export class Views {
       theme: this.appearance.chosen,
       closed: zoom.boxes.filter(({ id }) => zoom.hand.has(id)).map(({ path }) => path),
       shows: this.asMatrix() ? 'matrix' : this.appearance.shown.pathways ? 'pathways' : 'network',
-      window: this.asMatrix() || share.window === USUAL ? null : share.window,
+      window: this.asMatrix() || share.isWhole || share.window === USUAL ? null : share.window,
     };
   }
 
@@ -195,8 +235,33 @@ export class Views {
     return own || (other && `${other}${name.slice(dot)}`);
   }
 
-  /** Have a page, and the owner's run, be as a view says. @param {SavedView} view */
-  show({ step, speed, camera, curves, theme, closed, shows, window }) {
+  /** Have a page, and the owner's run, be as a view says; what is of another picture than the one that is shown waits for
+   * that. @param {SavedView} view */
+  show(view) {
+    const { appearance, share } = this,
+      { camera, shows, step, speed, theme } = view;
+    if (theme !== null && theme !== appearance.chosen) appearance.choose(theme);
+    if (shows === null ? camera && this.asMatrix() : (shows === 'matrix') !== this.asMatrix()) share.matrix.click();
+    if (shows !== null) appearance.have(shows === 'pathways');
+    share.run(step, speed);
+    this.later = view;
+    this.use();
+  }
+
+  /** Do the rest of what a view says, once the picture is there of which that is; for who cannot have it at once. */
+  use() {
+    const { later, appearance, share } = this,
+      { scene } = share.link;
+    if (!later || !scene) return;
+    const { shows } = later,
+      isOther = shows !== null && (shows === 'pathways') !== scene.pathways;
+    if (isOther && appearance.owner) return;
+    this.later = null;
+    this.finish(later, isOther);
+  }
+
+  /** Curves, closed boxes and the part that is seen, but for a part of another picture. @param {SavedView} view @param {boolean} isOther */
+  finish({ camera, curves, closed, window }, isOther) {
     const { share, zoom } = this,
       missing = curves ? this.pin(curves) : [];
     if (closed) {
@@ -204,23 +269,10 @@ export class Views {
       zoom.hand = new Set(zoom.boxes.filter(({ path }) => closed.includes(path)).map(({ id }) => id));
       zoom.from = '';
     }
-    if (theme !== null && theme !== this.appearance.chosen) this.appearance.choose(theme);
-    const { appearance } = this,
-      turns = shows !== null && (shows === 'pathways') !== appearance.shown.pathways && appearance.owner;
-    if (shows === null ? camera && this.asMatrix() : (shows === 'matrix') !== this.asMatrix()) share.matrix.click();
-    if (turns) appearance.toggle();
-    this.next = turns ? camera : null;
-    if (camera && !turns) share.fitting.see(window ?? USUAL, () => share.see(this.units(camera, true)));
-    share.run(step, speed);
+    if (camera === 'whole') share.camera.fit();
+    else if (camera && !isOther) share.fitting.see(window ?? USUAL, () => share.see(this.units(camera, true)));
     if (missing.length) share.tell(`left out, as there is none here: ${missing.join(', ')}`);
     this.redraw();
-  }
-
-  /** Another scene is there, which a view may have asked for. */
-  use() {
-    const { next } = this;
-    this.next = null;
-    if (next) this.share.see(this.units(next, true));
   }
 
   /** Pin curves and nothing else; what is none any more. What nothing is called may be a measure: the owner's run is asked
