@@ -45,13 +45,26 @@ class BodyError(ValueError):
 @dataclass(frozen=True, slots=True)
 class Port:
     """A sensor or an actuator: its name, how many numbers it is, and what they are measured in (may be empty). Of an
-    actuator, the range that the body takes; commands beyond it are clipped by the body."""
+    actuator, the range that the body takes; commands beyond it are clipped by the body. ``each`` are the ranges of its
+    numbers, where these have different ones."""
 
     name: str
     size: int
     unit: str = ""
     low: float = float("-inf")
     high: float = float("inf")
+    each: tuple[tuple[float, float], ...] = ()
+
+    @classmethod
+    def ranged(cls, name: str, unit: str, each: Sequence[tuple[float, float]]) -> Port:
+        """An actuator by the ranges of its numbers; its own is from the lowest to the highest of all."""
+        low, high = min((low for low, _ in each), default=0.0), max((high for _, high in each), default=0.0)
+        return cls(name, len(each), unit, low, high, tuple(each))
+
+    @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """The lowest and the highest that each of its numbers may be."""
+        return self.each or ((self.low, self.high),) * self.size
 
     @property
     def numbers(self) -> tuple[str, ...]:

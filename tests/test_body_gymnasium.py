@@ -113,12 +113,21 @@ def test_spaces_become_sensors_and_actuators() -> None:
     ]
     (action,) = body.actuators
     assert (action.name, action.size, action.low, action.high) == ("action", 2, 0, 3)
+    assert action.ranges == ((0, 3), (0, 1))
     start = body.sense()[1]
     assert body.sense().tolist() == [0, start, 0, 0, 0, 1, 0, 0]
     body.advance(1.0, np.array([2.4, 7.0]))  # rounded, and within what there is
     assert body.sense().tolist() == [1, start, 1, 2, 1, 1, 0, 0.5]
     assert body.skeleton is None
     assert body.pose().shape == (0,)
+
+
+def test_each_number_of_an_action_has_its_own_range(monkeypatch: pytest.MonkeyPatch) -> None:
+    box = spaces.Box(np.array([-0.4, -2.0], np.float32), np.array([0.5, np.inf], np.float32))
+    monkeypatch.setattr(Counter, "action_space", box)
+    (action,) = opened("test/Counter-v0").actuators
+    assert np.array(action.ranges) == pytest.approx(np.array([[-0.4, 0.5], [-2.0, np.inf]]))
+    assert (action.low, action.high) == (-2.0, np.inf)
 
 
 def test_an_episode_ends_and_a_reset_begins_another() -> None:

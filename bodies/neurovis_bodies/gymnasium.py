@@ -221,7 +221,7 @@ def _acted(space: spaces.Space[object]) -> tuple[Port, Callable[[FloatArray], ob
     if isinstance(space, spaces.Box):
         shape, dtype = space.shape, space.dtype
         low, high = (np.asarray(bound, dtype=np.float64).ravel() for bound in (space.low, space.high))
-        port = Port("action", len(low), "", float(low.min(initial=np.inf)), float(high.max(initial=-np.inf)))
+        port = _ranged(low, high)
         return port, lambda commands: np.clip(commands, low, high).astype(dtype).reshape(shape)
     if isinstance(space, (spaces.MultiDiscrete, spaces.MultiBinary)):
         shape, dtype = space.shape, space.dtype
@@ -231,10 +231,15 @@ def _acted(space: spaces.Space[object]) -> tuple[Port, Callable[[FloatArray], ob
             most = least + np.asarray(space.nvec, dtype=np.float64).ravel() - 1
         else:
             most = most + 1
-        port = Port("action", len(least), "", float(least.min(initial=0)), float(most.max(initial=0)))
+        port = _ranged(least, most)
         return port, lambda commands: np.clip(np.rint(commands), least, most).astype(dtype).reshape(shape)
     message = f"the action of this environment is a {type(space).__name__}"
     raise BodyError(message, "of numbers actuators can be made", "gymnasium")
+
+
+def _ranged(low: FloatArray, high: FloatArray) -> Port:
+    """The action by the lowest and the highest that each of its numbers may be."""
+    return Port.ranged("action", "", list(zip(low.tolist(), high.tolist(), strict=True)))
 
 
 def _pose_of(env: gymnasium.Env) -> tuple[Skeleton, Callable[[gymnasium.Env], FloatArray]] | None:

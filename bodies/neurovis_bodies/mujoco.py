@@ -274,10 +274,13 @@ def _actuators(model: mujoco.MjModel) -> Iterator[tuple[Port, range]]:
         size = int(model.actuator_ctrlnum[actuator]) if several else 1
         if name and size:
             places = range(start, start + size)
-            limited = all(model.actuator_ctrllimited[place] for place in places)
-            low, high = model.actuator_ctrlrange[start : start + size].T if limited else ([-np.inf], [np.inf])
-            unit = unit_of_actuator(model, actuator)
-            yield Port(name, size, unit, float(min(low)), float(max(high))), places
+            yield Port.ranged(name, unit_of_actuator(model, actuator), [_range(model, at) for at in places]), places
+
+
+def _range(model: mujoco.MjModel, place: int) -> tuple[float, float]:
+    """The lowest and the highest that a command may be."""
+    low, high = model.actuator_ctrlrange[place] if model.actuator_ctrllimited[place] else (-np.inf, np.inf)
+    return float(low), float(high)
 
 
 def _numbers(ports: Iterable[tuple[Port, range]]) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:

@@ -334,9 +334,10 @@ class Hub:
         if client.status != status:
             client.status = status
             yield status
-        if client.body.skeleton is not shown.body.skeleton:
-            client.body = shown.body
-            yield body_message(shown.body)
+        if client.body is not shown.body:
+            before, client.body = client.body, shown.body
+            if before != shown.body:
+                yield body_message(shown.body)
         if client.undefined != shown.undefined:
             client.undefined = shown.undefined
             yield undefined_message(shown.undefined)

@@ -493,8 +493,8 @@ class SimulatedSource:
 
 
 def _told(run: Simulation) -> FloatArray | None:
-    """What the body is told behind a step; None without a body, and where that is no finite number, so that the run
-    ends there."""
+    """What the body is told behind a step; None without a body, where its episode ends there, and where that is no
+    finite number, so that the run ends there."""
     try:
         return run.commands
     except BodyError:

@@ -8,7 +8,7 @@ step by step, goes back as far as it remembers, and takes the user's changes (``
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
@@ -78,10 +78,10 @@ class Drawn:
     """The body of what is shown: how its pose is drawn, None where there is nothing to draw, and what its sensors are
     called; ``start`` is where its middle was when the view began, x and y in metres. ``motors`` are of each number of
     its actuators where it moves the body (a point of the skeleton), its name, the lowest and the highest command, where
-    those are known."""
+    those are known. Those are equal that are drawn alike."""
 
     skeleton: Skeleton | None = None
-    sensor_names: tuple[str, ...] = ()
+    sensor_names: tuple[str, ...] = field(default=(), compare=False)
     start: tuple[float, float] = (0.0, 0.0)
     motors: tuple[Motor, ...] = ()
 
@@ -95,9 +95,9 @@ def drawn(
     """The body of what is shown from this pose on, and what moves it."""
     if skeleton is None or pose is None or not skeleton.points:
         return Drawn(None, sensor_names)
-    numbers = [(name, port) for port in actuators for name in port.numbers]
+    numbers = [one for port in actuators for one in zip(port.numbers, port.ranges, strict=True)]
     places = skeleton.joints if len(skeleton.joints) == len(numbers) else (-1,) * len(numbers)
-    motors = tuple(Motor(at, name, port.low, port.high) for at, (name, port) in zip(places, numbers, strict=True))
+    motors = tuple(Motor(at, name, *ends) for at, (name, ends) in zip(places, numbers, strict=True))
     return Drawn(skeleton, sensor_names, start_of(skeleton, pose), motors)
 
 

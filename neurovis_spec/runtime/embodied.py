@@ -129,6 +129,11 @@ class Embodied:
             raise BodyError(f"at step {state.k - 1}: {error}", error.hint, error.key) from None
         self._fresh = False
 
+    @property
+    def moved(self) -> bool:
+        """Whether the last step has moved it; else its episode ended there, and it was told nothing."""
+        return not self._fresh
+
     def commands(self, state: State) -> FloatArray:
         """What the actuators are told after a step. Raises BodyError where that is no number."""
         probed = self._probe.now(state)

@@ -212,9 +212,12 @@ class Simulation:
 
     @property
     def commands(self) -> FloatArray | None:
-        """What the actuators were told behind the last step, one number after the other; None without a body, and
-        before the first step. Raises BodyError where a command is no finite number."""
-        return None if self._body is None or self._state.k == 0 else self._body.commands(self._state)
+        """What the actuators were told behind the last step, one number after the other; None without a body, before
+        the first step, and behind one at which the body was reset. Raises BodyError where a command is no finite
+        number."""
+        if self._body is None or self._state.k == 0 or not self._body.moved:
+            return None
+        return self._body.commands(self._state)
 
     @property
     def actuators(self) -> Sequence[Port]:
