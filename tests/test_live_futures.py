@@ -15,7 +15,7 @@ import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.live import futures as kept
 from neurovis_spec.live.carry import carried
-from neurovis_spec.live.commands import Compare, Pause, Step
+from neurovis_spec.live.commands import Compare, Pause, Step, Switch
 from neurovis_spec.live.futures import Future
 from neurovis_spec.live.history import Bins, Members, Ring
 from neurovis_spec.live.protocol import ProtocolError, command_of, status_message
@@ -117,6 +117,24 @@ def test_what_was_is_kept_when_something_is_turned_in_the_past_and_can_be_gone_t
     while source.advance() and source.step < 260:
         pass
     assert source.futures.all[0].last == 200
+
+
+def test_a_run_is_gone_back_to_at_the_step_where_it_was() -> None:
+    source = at(60)
+    source.go(30)
+    source.turn(Lesion("A1"))
+    for _ in range(5):
+        source.advance()
+    source.switch(0)
+    source.go(58)
+    source.switch(1)
+    assert source.step == 35, "where the branch ends"
+    source.switch(0, 58)
+    assert source.step == 58
+    source.switch(1, 9)
+    assert source.step == 9
+    source.switch(0, 99)
+    assert source.step == 60
 
 
 def test_branches_of_branches_are_gone_to_through_these() -> None:
@@ -297,6 +315,43 @@ def test_futures_are_named_deleted_with_those_within_and_had_again() -> None:
     assert source.futures.restored() is None
 
 
+@pytest.mark.parametrize("turned", [True, False])
+def test_what_is_left_where_it_begins_can_be_gone_back_to_and_taken_back(turned: bool) -> None:
+    source = at(60)
+    first = everything(source)
+    source.go(30)
+    source.turn(Set({"pull": 0.4})) if turned else source.branch()
+    second = everything(source)
+    source.switch(0)
+    assert (source.step, everything(source)) == (30, first)
+    assert [(one.number, one.at, one.last, len(one.turned)) for one in source.futures.all] == [(1, 30, 30, turned)]
+    assert source.twin(1).reach == Reach(0, 30)
+    source.go(50)
+    source.switch(1)
+    assert (source.step, source.reach.last, source.parameters["pull"]) == (30, 30, 0.4 if turned else 0.1)
+    assert everything(source) == second, "and of what came after in the other nothing is left"
+    assert [(one.number, one.at, one.last) for one in source.futures.all] == [(0, 30, 60)]
+    if turned:
+        source.take_back(source.turned[-1].number)
+        assert (source.futures.now, source.futures.all, everything(source)) == (0, (), first)
+    else:
+        for _ in range(30):
+            source.advance()
+        assert everything(source) == first, "nothing was changed"
+
+
+def test_what_is_turned_in_a_branch_of_no_steps_and_taken_back_leads_into_no_other() -> None:
+    source = at(40)
+    source.go(20)
+    source.branch()
+    source.switch(0)
+    source.turn(Lesion("A1"))
+    source.switch(1)
+    source.turn(Set({"pull": 0.3}))
+    source.take_back(source.turned[-1].number)
+    assert (source.futures.now, source.reach.last, source.turned) == (1, 20, ())
+
+
 def test_a_name_goes_with_its_branch() -> None:
     source = at(30)
     source.go(10)
@@ -436,7 +491,8 @@ def test_a_status_tells_them_and_a_message_goes_there() -> None:
     assert [(one["number"], one["turned"]) for one in told[0]["within"]] == [(0, [])]
     left = run.shown().status.futures
     assert left.history() is source.futures.all[0].history
-    assert repr(command_of('{"type": "switch", "number": 1}')) == "Switch(number=1)"
+    assert command_of('{"type": "switch", "number": 1}') == Switch(1)
+    assert command_of('{"type": "switch", "number": 1, "shown": 9}') == Switch(1, 9)
     assert isinstance(source.futures.left, Future)
 
 

@@ -97,9 +97,10 @@ class Branch:
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """To another future, by its number."""
+    """To another future, by its number, to the step that is shown, or to another one."""
 
     number: int
+    shown: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,7 @@ class Future:
     ``history`` is that of its steps alone. ``within`` are the futures that branch off from it. Its run ``started`` at a
     step. It is asked for by its ``number``, which stays the same, also while the run goes on in it, and has a ``name``
     where somebody gave it one; ``place`` counts in which order they were left. One of an ``older`` spec cannot be gone
-    to. ``by_turn`` it was left by a turn, and without that the run goes on in it."""
+    to. ``by`` is the number of the turn that it was left by, if it was by one: without that the run goes on in it."""
 
     number: int
     at: int
@@ -49,7 +49,7 @@ class Future:
     within: tuple[Future, ...] = ()
     name: str = ""
     older: bool = False
-    by_turn: bool = False
+    by: int | None = None
     place: int = 0
 
     @property
@@ -86,13 +86,13 @@ class Futures:
         rest = (*(one for one in self.all if one.at <= left.at), made)
         return replace(self, all=rest, made=self.made + 1, now=self.fresh, fresh=self.fresh + 1, deleted=None)
 
-    def left_at(self, at: int, turned: Sequence[Turned]) -> Future | None:
-        """The one that was left last by a turn, behind a step until which it was ``turned`` in this way."""
+    def left_by(self, number: int, at: int, turned: Sequence[Turned]) -> Future | None:
+        """The one that was left by a turn of this number, behind a step until which it was ``turned`` in this way."""
         wanted = [(entry.number, entry.turn) for entry in turned]  # one in place of another has its number
         found = [
             one
             for one in self.all
-            if one.at == at and one.by_turn and not one.older
+            if one.at == at and one.by == number and not one.older
             if [(entry.number, entry.turn) for entry in one.turned if entry.step <= at] == wanted
         ]
         return max(found, key=attrgetter("place"), default=None)

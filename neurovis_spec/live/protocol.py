@@ -644,7 +644,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "event": ({"by": _whole(-1, 1)}, Event),
     "restart": ({}, Restart),
     "branch": ({}, Branch),
-    "switch": ({"number": _whole(0, _MOST)}, Switch),
+    "switch": ({"number": _whole(0, _MOST), "shown": _whole(0, _MOST)}, Switch),
     "theme": ({"name": _theme, "dark": _truth}, Themed),
     "compare": ({"number": _whole(-1, _MOST)}, Compare),
     "rename": ({"number": _whole(0, _MOST), "name": _called}, Rename),
@@ -676,6 +676,6 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "fetch": ({"what": _one_of(*get_args(What)), "seconds": _seconds}, Fetch),
 }
 #: Members that a message need not have.
-_OPTIONAL: Final = {"moving", "pathways", "rasters", "pairs", "branch"}
+_OPTIONAL: Final = {"moving", "pathways", "rasters", "pairs", "branch", "shown"}
 #: The types of the messages that a client may send, for the tests of the documentation.
 MESSAGES: Final = tuple(_MESSAGES)

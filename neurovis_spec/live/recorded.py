@@ -189,7 +189,7 @@ class RecordedSource:
         """Raises SourceError: a recording stays as it is."""
         raise SourceError("a recording cannot go on differently: run the spec")
 
-    def switch(self, number: int) -> None:
+    def switch(self, number: int, step: int | None = None) -> None:
         """Raises SourceError: there is no other future."""
         raise SourceError("a recording has no other future: run the spec")
 

@@ -328,7 +328,7 @@ class Run:
             case Branch():
                 source.branch()
             case Switch():
-                source.switch(asked.number)
+                source.switch(asked.number, asked.shown)
                 self._stand_elsewhere()
             case Compare():
                 self._aside = None if asked.number < 0 else Aside(source, asked.number)

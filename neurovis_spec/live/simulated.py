@@ -101,6 +101,8 @@ class SimulatedSource:
         self._ended: After | None = None
         self._listed: tuple[list[Turned], tuple[Turned, ...]] = ([], ())
         self._started = self._last = state.k
+        #: the step behind which it was left before it was gone to, and the turn that it was left by
+        self._by: tuple[int, int | None] = -1, None
         self._stuck = False
         self._simulation.restore(state)
         self._keep(self._kept())
@@ -276,19 +278,22 @@ class SimulatedSource:
         """All that it has done, as another future of a run that begins anew."""
         return self._left(-1).bounded() if self._last > 0 else self.futures
 
-    def _left(self, at: int, by_turn: bool = False) -> Futures:
-        """The futures with what came after this step among them, if anything did that can be gone to."""
-        if self._last <= at or not len(self._past):
+    def _left(self, at: int, by: int | None = None, whole: bool = False) -> Futures:
+        """The futures with what came after this step among them, left ``by`` a turn of this number, if anything did
+        that can be gone to. A ``whole`` run is left as it is, also where it has made no step since: it may be gone
+        back to."""
+        if (self._last <= at and not whole) or not len(self._past):
             return self.futures
         kept, history = self._past.after(at), self.history.after(at)
         turned = tuple(self._turned)
-        left = Future(0, at, self._last, self._started, turned, kept, history, name=self.name, by_turn=by_turn)
+        left = Future(0, at, self._last, self._started, turned, kept, history, name=self.name, by=by)
         return self.futures.leave(left)
 
-    def switch(self, number: int) -> None:
-        """Go to another future, to the step that is shown, or to its last. Raises SourceError, also where the body
-        cannot do again what it has done."""
-        path, step = self.futures.path(number), self.step
+    def switch(self, number: int, step: int | None = None) -> None:
+        """Go to another future, to a step, by default that which is shown, or to its last. Raises SourceError, also
+        where the body cannot do again what it has done."""
+        path = self.futures.path(number)
+        step = self.step if step is None else step
         if not path:
             raise SourceError("this branch is no longer kept")
         if path[-1].older:
@@ -315,29 +320,30 @@ class SimulatedSource:
         # what has all its states needs none of those before them
         if self.reach.first <= at or (at >= 0 and not future.kept):
             self.go(min(self.step, at))
-        others = self._left(at)
+        others = self._left(at, self._by[1] if self._by[0] == at else None, whole=True)
         if at < 0:
             self._begin(self._origin, (), {})
         self.futures = others
         self._past.cut(at)
+        self.history.cut(at)
         self._go_on(future)
         self._started = future.started
         self._make_up_to(max(self._first_seen, min(step, self._last)), again=True)
 
     def branch(self) -> None:
         """Have the run go on differently from here; what came after is another future."""
-        self._part(by_turn=False)
+        self._part()
 
-    def _leave(self, by_turn: bool) -> None:
+    def _leave(self, by: int | None = None) -> None:
         """What came after the current step is another future, with the name that the run had."""
         before = self.futures.made
-        self.futures = self._left(self.step, by_turn).bounded()
+        self.futures = self._left(self.step, by).bounded()
         if self.futures.made > before:
-            self.name = ""
+            self.name, self._by = "", (-1, None)
 
-    def _part(self, by_turn: bool) -> None:
-        """``branch``, or, ``by_turn``, what a turn does before it has its effect."""
-        self._leave(by_turn)
+    def _part(self, by: int | None = None) -> None:
+        """``branch``, or what a turn, ``by`` its number, does before it has its effect."""
+        self._leave(by)
         self._past.cut(self._simulation.k)
         self.history.cut(self.step)
         self._last = self.step
@@ -352,7 +358,7 @@ class SimulatedSource:
             refused = self._turn(what)
             if not refused:
                 kept = self._kept()
-                self._part(by_turn=True)
+                self._part(by=self._taken)
                 self._keep(kept)
                 self._turned = taken(self._turned, Turned(self.step, what, self._taken, back))
                 self._taken += 1
@@ -387,7 +393,7 @@ class SimulatedSource:
         """Be at the current step as though a turn had not been taken here."""
         step, before = self.step, self.futures
         rest = [entry for entry in self._turned if entry.step <= step and entry.number != one.number]
-        self._leave(by_turn=False)
+        self._leave()
         self._past.cut(step)
         self.history.cut(step)
         self._turned, self._last, self._listed = rest, step, ([], ())
@@ -400,7 +406,7 @@ class SimulatedSource:
         if here:
             self._keep(self._kept())
             self._seen = self._turned_seen()
-        without = before.left_at(step, rest)
+        without = before.left_by(one.number, step, rest)
         if without is not None and self.futures.path(without.number):
             self._go_on(without)
 
@@ -412,7 +418,7 @@ class SimulatedSource:
             self._past.keep(kept)
         assert isinstance(future.history, Ring)
         self.history.go_on(future.history)
-        self.name = future.name
+        self.name, self._by = future.name, (future.at, future.by)
         self._turned, self._last, self._listed = list(future.turned), future.last, ([], ())
 
     def _opposite(self, what: Turn) -> Turn:

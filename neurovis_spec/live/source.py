@@ -208,8 +208,9 @@ class Source(Protocol):
         opposite. Raises SourceError."""
         ...
 
-    def switch(self, number: int) -> None:
-        """Go to another future, by its number; the one that is left is another then. Raises SourceError."""
+    def switch(self, number: int, step: int | None = None) -> None:
+        """Go to another future, by its number, there to a step, by default that which is shown, or to the one that is
+        nearest; the future that is left is another then. Raises SourceError."""
         ...
 
     def twin(self, number: int) -> Source:

@@ -310,7 +310,7 @@ class ReceivedSource:
         """Raises SourceError: what arrives goes on by itself."""
         raise SourceError("what arrives goes on by itself")
 
-    def switch(self, number: int) -> None:
+    def switch(self, number: int, step: int | None = None) -> None:
         """Raises SourceError: there is no other future."""
         raise SourceError("what arrives goes on by itself")
 
