@@ -12,6 +12,7 @@ import pytest
 from test_live_browser import STEP, pause, shown
 from test_live_hand import at_hand
 from test_live_strips import JOIN, SCRUB, TYPED
+from test_live_undo import undone
 
 import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
@@ -21,6 +22,9 @@ from neurovis_spec.live.view import view_of
 pytestmark = pytest.mark.browser
 
 CURVES = "[...document.querySelectorAll('#strips .of')].map((one) => one.title).filter(Boolean)"
+#: Where the step that is shown lies on the axis below the curves.
+AXIS = """(({left, width}) => left + 8 + (scrub.value - scrub.min) / (scrub.max - scrub.min) * (width - 16))
+(ticks.getBoundingClientRect())"""
 NAME = "after the lesion"
 VIEW = "new URLSearchParams(%s).get('view').split(' ').map((one) => (+one).toFixed(2))"
 COPIES = """navigator.clipboard.writeText = async (text) => { window.copied = text };
@@ -73,9 +77,17 @@ def test_a_link_opens_the_page_where_it_stood_for_owners_and_viewers(tmp_path: P
             await opened.until(f"{STEP} >= 0")
             assert await opened.ask(STEP) == step
 
+            await opened.key("]")
+            await opened.key("p")
+            await opened.ask(f"{SCRUB}.value = {step} / 2; {SCRUB}.dispatchEvent(new Event('input'))")
+            await opened.until(f"{STEP} == {SCRUB}.value && {STEP} < {step}")
+            cursor = "cursor.getBoundingClientRect().left"
+            await opened.until(f"Math.abs({cursor} - ({AXIS})) < 1")
             await opened.key("f")
             await opened.until("!document.querySelector('#bar').offsetHeight")
             assert await opened.ask("document.querySelector('#picture').offsetHeight > 100")
+            assert await opened.ask("!time.offsetHeight && cursor.offsetHeight > 20")
+            await opened.until(f"Math.abs({cursor} - ({AXIS})) < 1")
             (tmp_path / "alone.png").write_bytes(await opened.shot())
             await opened.key("f")
             await opened.until("document.querySelector('#bar').offsetHeight")
@@ -265,6 +277,36 @@ def test_a_view_of_the_matrix_or_of_pathways_is_kept_called_otherwise_and_delete
             assert [(name, one.shows) for name, one in found.items()] == [
                 ("plain", "network"), ("weights", "matrix"), ("ways", "pathways")
             ]  # fmt: skip
+
+    asyncio.run(main())
+
+
+def test_what_begins_at_the_step_that_is_shown_is_gone_back_to_and_undone(tmp_path: Path) -> None:
+    current = "new URLSearchParams(location.hash.slice(1)).get('branch')"
+    go = "document.querySelector('#others .go')"
+
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await opened.until(f"{STEP} > 30")
+            last = await pause(opened)
+            await opened.ask(f"{SCRUB}.value = 20; {SCRUB}.dispatchEvent(new Event('input'))")
+            await opened.until(f"{STEP} == 20")
+            await opened.key("]")
+            await opened.ask("document.querySelector('#lesion').click()")
+            await opened.until(f"{go}?.textContent == 'from step 21 to {last}: as it went'")
+            await opened.ask(f"{go}.click()")
+            await opened.until(f"{go}?.textContent == 'from step 21 on: step 21: lesion C1'")
+            await opened.ask(f"{SCRUB}.value = 25; {SCRUB}.dispatchEvent(new Event('input'))")
+            await opened.until(f"{STEP} == 25 && {current} == '0'")
+            await opened.ask(f"{go}.click()")
+            await opened.until(f"{STEP} == 20 && {current} == '1'")
+            await undone(opened, "went to the branch from step 21 on")
+            await opened.until(f"{STEP} == 25 && {current} == '0'")
+            await undone(opened, f"went to the branch from step 21 to {last}")
+            await opened.until(f"{STEP} == 20 && {current} == '1'")
+            await undone(opened, "lesion C1")
+            await opened.until(f"{current} == '0' && document.querySelector('#futures').hidden")
+            assert await opened.ask("document.querySelector('#refusal').hidden")
 
     asyncio.run(main())
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 from chromium import Page
 from live_window import area_of, fit
 from PIL import Image
-from test_live_browser import pause, shown
+from test_live_browser import STEP, pause, shown
 from test_live_drawing import opened as drawn_alone
 from test_live_looking import TIP, places, told
+from test_live_strips import SCRUB
+from test_live_undo import undone
 
 from neurovis_spec.live.view import LEVELS, view_of
 from neurovis_spec.scene import Spline, Text
@@ -254,5 +257,79 @@ def test_a_click_on_a_title_closes_a_box_and_what_runs_to_it_is_added_up(tmp_pat
                 await opened.until(f"/^(B3|two)/.test({TIP}.textContent)")
                 closed.append(str(await opened.ask(f"{TIP}.textContent")).startswith("two"))
             assert closed[0] != closed[1]
+
+    asyncio.run(main())
+
+
+#: Move the pointer over the picture, from its middle out, until something is told of one box and the other.
+BETWEEN = """
+(async () => {
+  const { left, top, width, height } = picture.getBoundingClientRect();
+  for (let far = 0; far < height / 2; far += 4) for (let x = left + 5; x < left + width; x += 9) {
+    const y = top + height / 2 + (far % 8 ? far : -far);
+    picture.dispatchEvent(new PointerEvent('pointermove', {clientX: x, clientY: y, bubbles: true}));
+    if (picture.style.cursor != 'pointer') continue;
+    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+    if (tip.textContent.startsWith('one → two')) return tip.textContent;
+  }
+  return '';
+})()
+"""
+
+
+def test_beside_another_branch_what_is_told_is_of_both(tmp_path: Path) -> None:
+    """Of neurons, of closed boxes, and of what runs between these; and what shows the run alone is undone, too."""
+    (tmp_path / "boxes.yaml").write_text(BOXES)
+    compared = "document.body.classList.contains('compared')"
+
+    async def close(opened: Page, box: str) -> None:
+        await opened.key("o")
+        await opened.ask(f"Object.assign(document.querySelector('#search'), {{value: '{box}'}}).oninput()")
+        await opened.until(f"document.querySelector('#found li')?.textContent.startsWith('{box}')")
+        await opened.key("Enter")
+        await opened.key("Escape")
+        await opened.until("document.querySelector('#picture').matches(':focus')")
+        await opened.key("0")
+        await opened.key("Enter")
+        await opened.until(f"{TIP}.textContent.startsWith('{box}\\nmean ')")
+
+    async def main() -> None:
+        async with shown(str(tmp_path / "boxes.yaml"), tmp_path) as (opened, _, _):
+            await opened.size(1280, 800)
+            await opened.until(f"{STEP} > 12")
+            await pause(opened)
+            await opened.ask(f"{SCRUB}.value = 5; {SCRUB}.dispatchEvent(new Event('input'))")
+            await opened.until(f"{STEP} == 5")
+            await opened.key("]")
+            await told(opened, "A1")
+            await opened.ask("document.querySelector('#lesion').click()")
+            await opened.until("document.querySelector('#others .go') !== null")
+            await opened.until(f"/\\nlesioned$/m.test({TIP}.textContent)")
+            await opened.ask("document.querySelector('#step').click()")
+            await opened.until(f"{STEP} == 6")
+            beside = "document.querySelectorAll('#others button')[2].click()"
+            await opened.ask(beside)
+            await opened.until(f"/^lesioned in A$/m.test({TIP}.textContent)")
+            await opened.ask("document.querySelector('#others .go').click()")
+            await opened.until(f"!{compared}")
+            await opened.ask(beside)
+            await opened.until(f"/^activity [+]0.7[^,]*, in B 0$/m.test({TIP}.textContent)")
+            await opened.until(f"/^lesioned in B$/m.test({TIP}.textContent)")
+            await opened.ask("document.querySelector('#alone').click()")
+            await opened.until(f"!{compared}")
+            assert "lesioned" not in str(await opened.ask(f"{TIP}.textContent"))
+            await undone(opened, "A alone")
+            await opened.until(f"{compared} && /^lesioned in B$/m.test({TIP}.textContent)")
+            for box in ("two", "one"):
+                await close(opened, box)
+            await opened.until(f"/^mean [+]100 %, in B [+]75 %$/m.test({TIP}.textContent)")
+            said = str(await opened.ask(BETWEEN))
+            (tmp_path / "both.png").write_bytes(await opened.shot())
+            await opened.shot()
+            first, *rest = said.split("\n")
+            assert first.startswith("one → two · 20 connections, sum 10.")
+            assert "lesioned" not in first
+            assert rest[0] == "all excite"
+            assert re.fullmatch(r"in B sum [\d.]+ \(5 lesioned\); all excite", rest[1])
 
     asyncio.run(main())

@@ -30,7 +30,6 @@ export class Aside {
     this.matrix = null;
     /** the branch that is shown @type {Future | null} */
     this.branch = null;
-    find('alone').onclick = () => link.ask('compare', { number: -1 });
   }
 
   /** How many pictures there are. @returns {number} */

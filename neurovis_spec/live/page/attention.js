@@ -47,6 +47,15 @@ export function along(points) {
   return found;
 }
 
+/** In which of two branches something is so, in words; nothing where it is in neither. @param {string} words @param {number} bit
+ * @param {number[]} kinds of the run, and of the branch beside it @param {Look | null} other that branch, if there is one
+ * @returns {string[]} */
+function where(words, bit, kinds, other) {
+  const [inA, inB] = kinds.map((kind) => (kind & bit) !== 0);
+  if (!inA && !inB) return [];
+  return [other && inA !== inB ? `${words} in ${inA ? 'A' : 'B'}` : words];
+}
+
 /** What is pointed at and what is held, by the ids of their groups, '' for nothing. */
 export class Attention {
   /** @param {Link} link @param {Zoom} zoom @param {() => void} changed called when something else is to be seen
@@ -259,9 +268,10 @@ export class Attention {
   /** The same without its connections. @param {string} id @param {Look} look @returns {string} */
   itself(id, look) {
     const group = this.groups.get(id) ?? this.unseen(id);
+    const other = this.link.other?.serial ? this.link.other : null;
     const bundle = /^(bundle|joined):/.test(id) && (this.others.get(id) ?? this.zoom.joins(id));
-    if (bundle) return this.bands?.words(bundle, look) ?? '';
-    if (!group) return this.zoom.words(id, look);
+    if (bundle) return this.bands?.words(bundle, look, other) ?? '';
+    if (!group) return this.zoom.words(id, look, other);
     const [name, ...more] = group.title.split('\n'),
       { neuron, delay, state } = group.data;
     const what = neuron === undefined ? 'weight' : (state ?? 'activity'),
@@ -270,13 +280,13 @@ export class Attention {
     if (delay !== undefined && !more.some((line) => line.startsWith('delay '))) told.push(`delay ${delay}`);
     const item = Number(id.slice(1)) + (neuron === undefined ? 0 : look.widths.length);
     const { isClamped = 0, isFaint = 0 } = this.link.scene?.constants ?? {},
-      kind = look.kinds[item];
+      kinds = [look, other].map((one) => one?.kinds[item] ?? 0);
     return [
       name,
       ...told,
       ...more,
-      ...(neuron !== undefined && kind & isClamped ? ['clamped'] : []),
-      ...(kind & isFaint ? ['lesioned'] : []),
+      ...(neuron === undefined ? [] : where('clamped', isClamped, kinds, other)),
+      ...where('lesioned', isFaint, kinds, other),
     ].join('\n');
   }
 

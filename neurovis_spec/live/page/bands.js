@@ -85,6 +85,7 @@ export class Bands {
   /** What is told of a bundle. @param {string} id @param {Look} look @returns {Float32Array | null} */
   told(id, look) {
     const joined = id.startsWith('joined:') ? NUMBERS * Number(id.slice(7)) : -1;
+    if (joined >= look.added.length) return null;
     if (joined >= 0) return look.added.subarray(joined, joined + NUMBERS);
     const number = this.number.get(id) ?? -1;
     return number < 0 ? null : look.sums.subarray(NUMBERS * number, NUMBERS * (number + 1));
@@ -131,20 +132,33 @@ export class Bands {
     return { width: Math.round(width * fineness), colour: this.inks[0][at], ending: signs ? end : 1, share };
   }
 
-  /** What is said of a bundle that stands for several connections. @param {Group} group @param {Look} look
-   * @returns {string} */
-  words({ id, title, data }, look) {
-    const told = this.told(id, look);
-    if (!told) return title;
+  /** How many connections a bundle has, what they add up to, and what those do that are alike, in words. @param {Float32Array} told
+   * @returns {{many: number, sum: string, parts: string[]}} */
+  summed(told) {
     const [sums, counts] = [told.subarray(0, 3), told.subarray(3, 6)].map((part) => [...part]),
       total = (/** @type {number[]} */ values) => values.reduce((sum, value) => sum + value, 0);
     const lost = told[6] ? ` (${count(told[6])} lesioned)` : '',
       parts = counts.flatMap((many, at) => (many ? [`${count(many)} ${SAID[at]}, sum ${short(sums[at])}`] : []));
+    return {
+      many: total(counts),
+      sum: `sum ${short(total(sums))}${lost}`,
+      parts: parts.length > 1 ? parts : [parts[0]?.replace(/^[\d,]+ (.*),.*/, 'all $1') ?? ''],
+    };
+  }
+
+  /** What is said of a bundle that stands for several connections. @param {Group} group @param {Look} look
+   * @param {Look | null} other of the branch beside it @returns {string} */
+  words({ id, title, data }, look, other) {
+    const [told, beside] = [look, other].map((one) => one && this.told(id, one));
+    if (!told) return title;
+    const { many, sum, parts } = this.summed(told),
+      inB = beside && this.summed(beside);
     // what else its title says: rules and delays
     const more = title.split('\n').filter((line, at) => at && !/^[\d,]+ (excite|inhibit|neither|of them)/.test(line));
     return [
-      `${data.pathway.replace('->', '→')} · ${count(total(counts))} connections, sum ${short(total(sums))}${lost}`,
-      ...(parts.length > 1 ? parts : [parts[0]?.replace(/^[\d,]+ (.*),.*/, 'all $1') ?? '']),
+      `${data.pathway.replace('->', '→')} · ${count(many)} connections, ${sum}`,
+      ...parts,
+      ...(inB ? [`in B ${[inB.sum, ...inB.parts].join('; ')}`] : []),
       ...more,
     ]
       .filter(Boolean)

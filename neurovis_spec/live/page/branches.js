@@ -13,8 +13,11 @@ import { told } from './told.js';
 /** All of a tree. @param {Future[]} futures @returns {Future[]} */
 export const every = (futures) => futures.flatMap((one) => [one, ...every(one.within)]);
 
+/** From which step to which a branch goes, if it has gone any. @param {Future} branch @returns {string} */
+const span = ({ at, last }) => `from step ${at + 1} ${last > at ? `to ${last}` : 'on'}`;
+
 /** How a branch is called. @param {Future} branch @returns {string} */
-export const called = ({ name, at, last }) => name || `the branch from step ${at + 1} to ${last}`;
+export const called = (branch) => branch.name || `the branch ${span(branch)}`;
 
 /** The list of branches. */
 export class Branches {
@@ -41,6 +44,7 @@ export class Branches {
     this.compared = null;
     /** the one that is being named */
     this.naming = -1;
+    find('alone').onclick = () => this.put(-1, 'A alone');
   }
 
   /** @param {Status} status */
@@ -114,20 +118,33 @@ export class Branches {
     return [words, rename];
   }
 
-  /** Have the run go to a branch, so that it can be undone. @param {number} number @param {string} own */
+  /** Have the run go to a branch, so that it can be undone: back to the step at which it was. @param {number} number
+   * @param {string} own */
   enter(number, own) {
-    const to = (/** @type {number} */ one) => () => this.link.ask('switch', { number: one });
-    this.undo.whole({ words: `went to ${own}`, undo: to(this.current), redo: to(number) });
+    const { current, link } = this,
+      shown = link.look?.step ?? 0;
+    this.undo.whole({
+      words: `went to ${own}`,
+      undo: () => link.ask('switch', { number: current, shown }),
+      redo: () => link.ask('switch', { number }),
+    });
+  }
+
+  /** Have a branch shown beside the run, −1 for none, so that it can be undone. @param {number} number @param {string} words */
+  put(number, words) {
+    const show = (/** @type {number} */ which) => () => this.link.ask('compare', { number: which });
+    this.undo.whole({ words, undo: show(this.compared ?? -1), redo: show(number) });
   }
 
   /** What can be done with a branch. @param {Future} future @returns {HTMLElement} */
   branch(future) {
-    const { number, name, at, last, turned, within, older } = future;
+    const { number, name, turned, within, older } = future;
     const words = turned.map((entry) => `step ${entry.step + 1}: ${told(entry)}`).join('; ') || 'as it went',
-      span = `from step ${at + 1} to ${last}`,
       own = called(future);
-    const go = button(`${name ? `${name}, ` : ''}${span}: ${words}${older ? ' (of an older spec)' : ''}`, '', () =>
-      older ? this.choose(number, own) : this.enter(number, own),
+    const go = button(
+      `${name ? `${name}, ` : ''}${span(future)}: ${words}${older ? ' (of an older spec)' : ''}`,
+      '',
+      () => (older ? this.choose(number, own) : this.enter(number, own)),
     );
     go.className = 'go';
     go.title = older
@@ -135,12 +152,11 @@ export class Branches {
       : 'go there, to the same step';
     go.disabled = !this.owner && !older;
     const beside = button('A | B', `A | B with ${own}`, () => {
-      const isShown = this.compared === number,
-        show = (/** @type {number} */ which) => () => this.link.ask('compare', { number: which });
-      const [now, back] = isShown ? [-1, number] : [number, this.compared ?? -1];
-      show(now)();
-      if (!isShown && this.chosen !== number) this.choose(number, own);
-      this.undo.act({ words: isShown ? 'A alone' : `A | B, ${own}`, undo: show(back), redo: show(now) });
+      if (this.compared === number) this.put(-1, 'A alone');
+      else {
+        if (this.chosen !== number) this.choose(number, own);
+        this.put(number, `A | B, ${own}`);
+      }
     });
     beside.setAttribute('aria-pressed', String(this.compared === number));
     beside.className = 'small';

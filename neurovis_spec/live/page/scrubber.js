@@ -28,6 +28,8 @@ export class Scrubber {
     this.marks = /** @type {HTMLCanvasElement} */ (find('marks'));
     this.cursor = find('cursor');
     this.size = new Sized(/** @type {HTMLElement} */ (this.scrub.parentElement), changed);
+    /** the axis below the strips, which is there also where this one is hidden, as in a talk */
+    this.ticks = new Sized(find('ticks'), changed);
     this.sought = -KEPT;
     this.goal = 0;
     this.timer = 0;
@@ -125,10 +127,10 @@ export class Scrubber {
     const words = `back to ${first}`;
     if (this.reach.textContent !== words) this.reach.textContent = words;
     this.cursor.hidden = step < this.low || step > this.high;
-    const { left, wide } = this.size,
+    const { left, wide } = this.ticks,
       at = left + THUMB + this.across(step) * (wide - 2 * THUMB);
     this.cursor.style.transform = `translateX(${at.toFixed(1)}px)`;
-    this.mark(wide);
+    this.mark(this.size.wide);
   }
 
   /** Mark what happened: a filled triangle for an event of the spec, a ring for a turn. @param {number} width */

@@ -339,14 +339,20 @@ export class Zoom {
     return Math.round(levels.reduce((sum, level) => sum + level, 0) / (levels.length || 1));
   }
 
-  /** What is said of a closed box: its mean is in percent of the scale of colours, with its sign. @param {string} id
-   * @param {Look} look @returns {string} */
-  words(id, look) {
+  /** The mean colour of a box's neurons in percent of the scale of colours, with its sign. @param {Box} box @param {Look} look
+   * @returns {string} */
+  percent(box, look) {
+    const mean = Math.round((100 * this.mean(box, look)) / (this.scene?.constants.levels ?? 1));
+    return `${mean < 0 ? '−' : mean > 0 ? '+' : ''}${Math.abs(mean)} %`;
+  }
+
+  /** What is said of a closed box. @param {string} id @param {Look} look @param {Look | null} other of the branch beside it
+   * @returns {string} */
+  words(id, look, other) {
     const box = this.boxes.find((one) => one.id === id);
-    if (!box || !this.scene) return '';
-    const mean = Math.round((100 * this.mean(box, look)) / this.scene.constants.levels);
-    const sign = mean < 0 ? '−' : mean > 0 ? '+' : '';
-    return `${box.path}\nmean ${sign}${Math.abs(mean)} %\nneurons ${box.members.length}`;
+    if (!box) return '';
+    const inB = other ? `, in B ${this.percent(box, other)}` : '';
+    return `${box.path}\nmean ${this.percent(box, look)}${inB}\nneurons ${box.members.length}`;
   }
 
   /** The closed box under a unit, '' for none. @param {number[]} at @returns {string} */
@@ -402,9 +408,8 @@ export class Zoom {
       context.fill();
       context.stroke();
       context.fillStyle = palette.texts[level];
-      const [, mean] = this.words(box.id, look).split('\n'),
-        room = x1 - x0 - 4 * page;
-      const lines = [box.path.split('.').pop() || '', mean.slice(5)];
+      const room = x1 - x0 - 4 * page,
+        lines = [box.path.split('.').pop() || '', this.percent(box, look)];
       const fits = y1 - y0 > 2.6 * NAMED * page ? lines : lines.slice(0, 1),
         below = y1 - y0 - (fits.length * 1.25 + 1) * NAMED * page,
         isRoomy = below >= RASTER * page && x1 - x0 >= 2 * RASTER * page && box.members.length > 1;
