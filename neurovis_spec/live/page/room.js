@@ -186,7 +186,8 @@ export class Room {
     if (!legend.isChosen) panel.open = free !== undefined;
     legend.draw(room);
     const { size } = legend.flow(room),
-      over = -title - 1;
+      // for fingers it is higher than the line of the title
+      over = Math.max(-title - 1, -find('heading').offsetHeight);
     const isHalf = this.pictures > 1 && !document.body.classList.contains('stacked');
     let [x, y] = [left + (isHalf ? 2 : 1) * wide - legend.heading.offsetWidth - GAP, over];
     if (panel.open) [x, y] = at([size[0] + 2 * GAP, size[1] + title + GAP], corner);
