@@ -199,6 +199,15 @@ class Layout:
     labels: Mapping[str, Side] = field(default_factory=dict)
     direction: Direction | None = None
 
+    @property
+    def sides(self) -> tuple[float, float]:
+        """How wide and high all of it is, with its discs."""
+        points = [*self.positions.values(), *(point for route in self.routes.values() for point in route)]
+        wide, high = (
+            (max(ends) - min(ends) + 2 * RADIUS for ends in zip(*points, strict=True)) if points else (0.0, 0.0)
+        )
+        return wide, high
+
     def __repr__(self) -> str:
         sizes = f"{len(self.positions):,} positions, {len(self.routes):,} routes"
         return f"<layout of {self.network} by {self.engine}: {sizes}>"

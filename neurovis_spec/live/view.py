@@ -293,9 +293,8 @@ def view_of(
     }
     joined, bands = _bundles(planned)
     by_hand = {**declared(compiled), **ranges_of(drawn)}
-    more = {**by_hand, **names, **begins, **bands, "themes": list(THEMES), "themed": themed}
-    more["pathways"] = appearance.pathways
-    more["window"] = window_of(compiled)
+    asked = {"themed": themed, "pathways": appearance.pathways, "window": window_of(compiled)}
+    more = {**by_hand, **names, **begins, **bands, **asked, "themes": list(THEMES)}
     words = content(drawn.network, scene, rows, _constants(drawn, planned), more)
     otherwise = otherwise or partial(view_of, compiled, gains, theme, engine, layout=layout)
     dress = partial(_dressed, compiled, gains, appearance, layout, otherwise)

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
 from neurovis_spec.compilation import Compilation
-from neurovis_spec.layout.geometry import bounds, padded
 from neurovis_spec.layout.model import RADIUS, Layout, LayoutRefusalError
 
 #: Of which shape a window is: higher than wide, wider than high, or neither clearly.
@@ -36,12 +35,12 @@ class Shape:
 
     def scale(self, layout: Layout) -> float:
         """How many pixels a unit of the layout has, where the whole is as large as it is drawn."""
-        wide, high = _sides(layout)
+        wide, high = layout.sides
         return min(_MOST, max(min(across / wide, down / high) for across, down in self.rooms))
 
     def is_filled(self, layout: Layout) -> bool:
         """Whether the network takes most of a room, or is as large as it can be, so that no layout is much larger."""
-        wide, high = _sides(layout)
+        wide, high = layout.sides
         ratios = [(across / wide, down / high) for across, down in self.rooms]
         return self.scale(layout) == _MOST or any(min(both) >= _FILLED * max(both) for both in ratios)
 
@@ -86,10 +85,3 @@ def window_of(compiled: Compilation) -> Window:
     """The window for which a network is laid out."""
     size = compiled.network.render.size
     return next((window for window, shape in SHAPES.items() if shape.page == size), "default")
-
-
-def _sides(layout: Layout) -> tuple[float, float]:
-    """How wide and high all of a layout is, with its discs."""
-    points = [*layout.positions.values(), *(point for route in layout.routes.values() for point in route)]
-    x0, y0, x1, y1 = padded(bounds(points), RADIUS)
-    return x1 - x0, y1 - y0

@@ -127,14 +127,9 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
     first = Looks(fill_values[0], line_values[0], widths[0], glows[0], ends[0])
     tips = tooltips(network, gains, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
     scene = paint(planned, first, glowing, captions[0], tips, steps[0])
-    bands, band_widths = _followed(scene, following.names, band_widths)
-    begun = dict(zip(bands, band_widths[0].tolist(), strict=True))
+    scene, bands, band_widths = _followed(scene, following.names, band_widths)
     return Film(
-        scene=replace(
-            scene,
-            groups=tuple(widened(group, begun) for group in scene.groups) if begun else scene.groups,
-            told=told(drawn, low[1], high[1], ends, steps[-1]),
-        ),
+        scene=replace(scene, told=told(drawn, low[1], high[1], ends, steps[-1])),
         fps=fps,
         fills=tuple(f"n{index}" for index in range(len(network.neurons))),
         lines=tuple(f"c{index}" for index in range(len(network.connections))),
@@ -165,13 +160,20 @@ def _changing(drawn: Gathered) -> IntArray:
 
 def _followed(
     scene: Scene, names: tuple[tuple[str, int], ...], widths: FloatArray
-) -> tuple[tuple[tuple[str, int], ...], FloatArray]:
-    """Of bands with these widths (frames, bands) those that are not as wide all the time as the scene has them."""
+) -> tuple[Scene, tuple[tuple[str, int], ...], FloatArray]:
+    """Of bands with these widths (frames, bands) those that are not as wide all the time as the scene has them, and the
+    scene in which they are as wide as they begin."""
     groups = {group.id: group for group in scene.groups} if names else {}
     shapes = [groups[name].shapes[place] for name, place in names]
     drawn = np.array([shape.width if isinstance(shape, Spline) else np.nan for shape in shapes])
     some = np.flatnonzero(~np.isclose(widths, drawn, rtol=1e-9, atol=0).all(axis=0))
-    return tuple(names[number] for number in some.tolist()), widths[:, some]
+    bands, widths = tuple(names[number] for number in some.tolist()), widths[:, some]
+    begun = dict(zip(bands, widths[0].tolist(), strict=True))
+    return (
+        replace(scene, groups=tuple(widened(group, begun) for group in scene.groups)) if begun else scene,
+        bands,
+        widths,
+    )
 
 
 def widened(group: Group, bands: Mapping[tuple[str, int], float]) -> Group:

@@ -116,8 +116,7 @@ def _ranked(problem: LayoutProblem) -> Layout:
 
 def _side(layout: Layout, page: float) -> float:
     """How high a page has to be, at least, for what is laid out to fit; ``page`` is its width by its height."""
-    points = [*layout.positions.values(), *(point for route in layout.routes.values() for point in route)]
-    wide, high = (np.ptp(np.array(points), axis=0) + 2 * RADIUS).tolist() if points else (0.0, 0.0)
+    wide, high = layout.sides
     return max(wide / page, high)
 
 

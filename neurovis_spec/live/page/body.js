@@ -2,7 +2,8 @@
  * The body: its pose at the step that is shown, from above and from its right side, in metres, as films have it.
  */
 
-import { channels } from './colours.js';
+import { mixed } from './colours.js';
+import { endsOf, thickness } from './links.js';
 import { Motors, pie } from './motors.js';
 import { Space } from './space.js';
 import { roundAbove, written } from './ticks.js';
@@ -56,18 +57,6 @@ const FLAT = 1e-6;
  * @returns {string} */
 function metres(value, step) {
   return `${value === 0 ? '0' : written(value, step)} m`;
-}
-
-/** A colour of which so much is left in another one. @param {string} colour @param {string} other @param {number} share
- * @returns {string} */
-function mixed(colour, other, share) {
-  const [one, two] = [channels(colour), channels(other)];
-  return `rgb(${one.map((value, at) => Math.round(share * value + (1 - share) * two[at])).join(',')})`;
-}
-
-/** The points of a link: the ends of its line, then of those beside it. @param {number[]} link @returns {number[]} */
-function endsOf([start, end, , ...beside]) {
-  return [start, end, ...beside];
 }
 
 /** The corners of the convex hull of points on the page, in order. @param {[number, number][]} points
@@ -426,23 +415,18 @@ export class Body {
   /** Joints in the colours of what moves them. @param {CanvasRenderingContext2D} context @param {Frame} frame
    * @param {Theme} theme @param {number[][]} points @param {Joint[]} joints */
   joints(context, frame, theme, points, joints) {
+    const { links = [] } = this.skeleton ?? {};
     for (const { point, colours } of joints) {
       const isFar = frame.up === 2 && this.layer(points, [point]) < 0,
         seen = isFar ? colours.map((one) => mixed(one, theme.box_fill, FAR)) : colours;
-      pie(context, this.spot(frame, points[point]), this.thickness(point) * frame.scale, seen, theme);
+      pie(context, this.spot(frame, points[point]), thickness(links, point) * frame.scale, seen, theme);
     }
-  }
-
-  /** How thick what ends at a point is, in metres. @param {number} point @returns {number} */
-  thickness(point) {
-    const links = this.skeleton?.links ?? [];
-    return Math.max(0, ...links.filter((link) => endsOf(link).includes(point)).map((link) => link[2]));
   }
 
   /** Feet, filled where they touch something, and these in front of the others. @param {CanvasRenderingContext2D} context @param {Frame} frame
    * @param {Theme} theme @param {number[][]} points @param {boolean[]} touching */
   feet(context, frame, theme, points, touching) {
-    const { feet = [] } = this.skeleton ?? {};
+    const { feet = [], links = [] } = this.skeleton ?? {};
     const ordered = feet.map((point, at) => ({ point, at, order: frame.up === 1 ? 0 : this.layer(points, [point]) }));
     ordered.sort((one, other) => one.order - other.order || Number(touching[one.at]) - Number(touching[other.at]));
     for (const { point, at, order } of ordered) {
@@ -451,7 +435,7 @@ export class Body {
       this.disc(
         context,
         this.spot(frame, points[point]),
-        Math.min(LARGE, Math.max(SMALL, FOOT * this.thickness(point) * frame.scale)),
+        Math.min(LARGE, Math.max(SMALL, FOOT * thickness(links, point) * frame.scale)),
         fill,
         edge,
       );

@@ -9,6 +9,14 @@ export function channels(colour) {
   return [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
 }
 
+/** A colour of which so much is left in another one. @param {string} colour @param {string} other @param {number} share
+ * @returns {string} */
+export function mixed(colour, other, share) {
+  const [one, two] = [channels(colour), channels(other)],
+    both = one.map((value, at) => Math.round(share * value + (1 - share) * two[at]));
+  return `#${both.map((value) => value.toString(16).padStart(2, '0')).join('')}`;
+}
+
 /** Relative luminance (WCAG 2). @param {number[]} rgb @returns {number} */
 export function luminance(rgb) {
   const [r, g, b] = rgb.map((v) => v / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));

@@ -4,7 +4,7 @@
  * a number is at an end of its range, or where that has none as large as it has been.
  */
 
-import { channels } from './colours.js';
+import { mixed } from './colours.js';
 
 /** @typedef {import('./protocol.js').Motor} Motor */
 /** @typedef {import('./protocol.js').Theme} Theme */
@@ -52,9 +52,7 @@ export class Motors {
 
 /** The colour of a share of the activity. @param {Theme} theme @param {number} share @returns {string} */
 function between({ negative, zero, positive }, share) {
-  const [from, to] = [zero, share < 0 ? negative : positive].map(channels),
-    mixed = from.map((value, at) => Math.round(value + Math.abs(share) * (to[at] - value)));
-  return `#${mixed.map((value) => value.toString(16).padStart(2, '0')).join('')}`;
+  return mixed(share < 0 ? negative : positive, zero, Math.abs(share));
 }
 
 /** A disc in sectors, from the top on. @param {CanvasRenderingContext2D} context @param {[number, number]} middle

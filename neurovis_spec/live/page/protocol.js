@@ -92,6 +92,8 @@ const SCENE = 1,
   ADDED = 10,
   ASIDE = 12,
   HEAD = 40;
+/** Who is told of traces of these kinds. @type {Object<number, 'traces' | 'left' | 'pairs' | 'leftPairs'>} */
+const TRACES = { [TRACE]: 'traces', [LEFT]: 'left', [PAIRS]: 'pairs', [LEFT_PAIRS]: 'leftPairs' };
 
 /** Unpack what is compressed behind a head. @param {ArrayBuffer} buffer */
 async function unzip(buffer) {
@@ -319,41 +321,23 @@ export class Link {
     } else if (kind === FILE) {
       const from = 4 + new DataView(data).getUint16(2, true);
       this.listener.file(new TextDecoder().decode(data.slice(4, from)), new Blob([data.slice(from)]));
-    } else if (kind === TRACE && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
-      this.listener.traces(unpackTraces(data, this.scene));
-    } else if (kind === LEFT && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
-      this.listener.left(unpackTraces(data, this.scene));
-    } else if (kind === PAIRS && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
-      this.listener.pairs(unpackTraces(data, this.scene));
-    } else if (kind === LEFT_PAIRS && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
-      this.listener.leftPairs(unpackTraces(data, this.scene));
-    } else if (kind === RASTER && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
-      this.listener.raster(unpackRaster(data, this.scene));
-    } else if (
-      kind === SUMS &&
-      this.scene &&
-      this.look &&
-      new DataView(data).getUint16(2, true) === this.scene.version
-    ) {
-      takeSums(data, this.look.sums);
-    } else if (
-      kind === JOINED &&
-      this.scene &&
-      this.look &&
-      new DataView(data).getUint16(2, true) === this.scene.version
-    ) {
+    } else if (this.scene && this.look && new DataView(data).getUint16(2, true) === this.scene.version) {
+      await this.more(kind, data, this.scene, this.look);
+    }
+  }
+
+  /** What belongs to the scene that is shown. @param {number} kind @param {ArrayBuffer} data @param {Scene} scene @param {Look} look */
+  async more(kind, data, scene, look) {
+    const traced = TRACES[kind];
+    if (traced) this.listener[traced](unpackTraces(data, scene));
+    else if (kind === RASTER) this.listener.raster(unpackRaster(data, scene));
+    else if (kind === SUMS) takeSums(data, look.sums);
+    else if (kind === ADDED) takeSums(data, look.added);
+    else if (kind === HELD) this.listener.held(await unzip(data));
+    else if (kind === JOINED) {
       const joined = await unzip(data);
-      this.look.added = new Float32Array(NUMBERS * joined.ends.length);
+      look.added = new Float32Array(NUMBERS * joined.ends.length);
       this.listener.joined(joined);
-    } else if (
-      kind === ADDED &&
-      this.scene &&
-      this.look &&
-      new DataView(data).getUint16(2, true) === this.scene.version
-    ) {
-      takeSums(data, this.look.added);
-    } else if (kind === HELD && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
-      this.listener.held(await unzip(data));
     }
   }
 

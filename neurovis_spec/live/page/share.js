@@ -173,6 +173,11 @@ export class Share {
     this.strips.only(pinned);
   }
 
+  /** Whether the matrix is shown in place of the picture. @returns {boolean} */
+  get asMatrix() {
+    return this.matrix.getAttribute('aria-pressed') === 'true';
+  }
+
   /** Whether the whole picture is seen. @returns {boolean} */
   get isWhole() {
     const { zoom, shift } = this.camera;
@@ -187,7 +192,7 @@ export class Share {
     if (!controls.playing && link.look) said.set('step', String(link.look.step));
     if (!controls.playing || this.branches.isSeveral) said.set('branch', String(this.branches.current));
     if (controls.speed.value !== '1') said.set('speed', controls.speed.value);
-    const isWhole = this.matrix.getAttribute('aria-pressed') === 'true' || this.isWhole;
+    const isWhole = this.asMatrix || this.isWhole;
     if (!isWhole) said.set('view', this.seen().join(' '));
     if (!isWhole && this.window !== USUAL) said.set('window', this.window);
     if (curves !== this.begun) said.set('curves', curves);

@@ -4,6 +4,7 @@
  */
 
 import { channels } from './colours.js';
+import { endsOf, meeting, thickness } from './links.js';
 import { pie } from './motors.js';
 
 /** @typedef {import('./protocol.js').Skeleton} Skeleton */
@@ -271,24 +272,21 @@ export class Space {
     return { depth, draw };
   }
 
-  /** How thick what meets at a point is, in metres, and how near is what stands before all of it.
-   * @param {Skeleton} skeleton @param {number} point @param {Point[]} points */
-  meeting(skeleton, point, points) {
-    const own = skeleton.links
-        .map(([start, end, radius, ...beside]) => ({ ends: [start, end, ...beside], radius }))
-        .filter(({ ends }) => ends.includes(point)),
-      depths = own.map(({ ends }) => this.depth(middle(ends.map((at) => points[at]))));
-    return {
-      thick: Math.max(0, ...own.map(({ radius }) => radius)),
-      depth: Math.max(this.depth(points[point]), ...depths) + 1e-6,
-    };
+  /** How near what stands before all links that meet at a point is. @param {Skeleton} skeleton @param {number} point
+   * @param {Point[]} points @returns {number} */
+  before(skeleton, point, points) {
+    const middles = meeting(skeleton.links, point).map((link) => middle(endsOf(link).map((at) => points[at])));
+    return Math.max(this.depth(points[point]), ...middles.map((at) => this.depth(at))) + 1e-6;
   }
 
   /** A joint in the colours of what moves it, before the links that meet there. @param {CanvasRenderingContext2D} context
    * @param {Theme} theme @param {Skeleton} skeleton @param {Joint} joint @param {Point[]} points @returns {Item} */
   joint(context, theme, skeleton, { point, colours }, points) {
-    const { thick, depth } = this.meeting(skeleton, point, points);
-    return { depth, draw: () => pie(context, this.spot(points[point]), thick * this.centre.scale, colours, theme) };
+    const thick = thickness(skeleton.links, point) * this.centre.scale;
+    return {
+      depth: this.before(skeleton, point, points),
+      draw: () => pie(context, this.spot(points[point]), thick, colours, theme),
+    };
   }
 
   /** The faces of a convex hull that are turned to who looks. @param {CanvasRenderingContext2D} context
@@ -340,7 +338,7 @@ export class Space {
   /** A foot, in front of the links that end there. @param {CanvasRenderingContext2D} context @param {Theme} theme
    * @param {Skeleton} skeleton @param {number} foot @param {Point[]} points @param {boolean} isDown @returns {Item} */
   foot(context, theme, skeleton, foot, points, isDown) {
-    const { thick, depth } = this.meeting(skeleton, foot, points);
+    const thick = thickness(skeleton.links, foot);
     const draw = () => {
       context.beginPath();
       context.arc(
@@ -354,7 +352,7 @@ export class Space {
       context.fill();
       context.stroke();
     };
-    return { depth, draw };
+    return { depth: this.before(skeleton, foot, points), draw };
   }
 }
 

@@ -180,18 +180,13 @@ export class Views {
     this.undo.whole({ words: `went to ${name}`, undo: () => this.show(before), redo: () => this.show(view) });
   }
 
-  /** Whether the matrix is shown in place of the picture. */
-  asMatrix() {
-    return this.share.matrix.getAttribute('aria-pressed') === 'true';
-  }
-
   /** Where the page stands. @returns {SavedView} */
   state() {
     const { share, zoom } = this;
     return {
       step: share.link.look?.step ?? 0,
       speed: share.controls.speed.value,
-      camera: this.asMatrix() ? null : share.isWhole ? 'whole' : this.units(share.seen(), false),
+      camera: share.asMatrix ? null : share.isWhole ? 'whole' : this.units(share.seen(), false),
       curves: share.strips.pinned.map((strip) => {
         const [first, ...behind] = [strip.key, ...strip.behind].map((key) => this.named(key));
         const more = strip.joined.map(({ key }) => ` with ${this.named(key)}`);
@@ -200,8 +195,8 @@ export class Views {
       }),
       theme: this.appearance.chosen,
       closed: zoom.boxes.filter(({ id }) => zoom.hand.has(id)).map(({ path }) => path),
-      shows: this.asMatrix() ? 'matrix' : this.appearance.shown.pathways ? 'pathways' : 'network',
-      window: this.asMatrix() || share.isWhole || share.window === USUAL ? null : share.window,
+      shows: share.asMatrix ? 'matrix' : this.appearance.shown.pathways ? 'pathways' : 'network',
+      window: share.asMatrix || share.isWhole || share.window === USUAL ? null : share.window,
     };
   }
 
@@ -241,7 +236,7 @@ export class Views {
     const { appearance, share } = this,
       { camera, shows, step, speed, theme } = view;
     if (theme !== null && theme !== appearance.chosen) appearance.choose(theme);
-    if (shows === null ? camera && this.asMatrix() : (shows === 'matrix') !== this.asMatrix()) share.matrix.click();
+    if (shows === null ? camera && share.asMatrix : (shows === 'matrix') !== share.asMatrix) share.matrix.click();
     if (shows !== null) appearance.have(shows === 'pathways');
     share.run(step, speed);
     this.later = view;
