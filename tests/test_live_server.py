@@ -30,7 +30,7 @@ from neurovis_spec.live.commands import REQUESTS, Appearance, Pause, Seek
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import AHEAD, Hub
 from neurovis_spec.live.live import listen
-from neurovis_spec.live.protocol import FILE, FRAME, LARGEST, MESSAGES, SCENE, TRACE
+from neurovis_spec.live.protocol import FILE, FRAME, HELD, LARGEST, MESSAGES, SCENE, TRACE
 from neurovis_spec.live.run import Run, Stage
 from neurovis_spec.live.server import BURST, MOST_CLIENTS, MOST_CONNECTIONS, Server
 from neurovis_spec.live.simulated import SimulatedSource
@@ -80,7 +80,7 @@ class Live:
 
 
 @asynccontextmanager
-async def serving() -> AsyncIterator[Live]:
+async def serving(started: bool = True) -> AsyncIterator[Live]:
     hub, call = Hub(asyncio.get_running_loop(), REQUESTS), asyncio.get_running_loop().call_soon_threadsafe
     run = Run(SimulatedSource(COMPILED.simulator()), VIEW, hub.show, lambda: hub.watched)
     sock = listen("127.0.0.1", 0)
@@ -88,7 +88,8 @@ async def serving() -> AsyncIterator[Live]:
     desk = Desk(COMPILED, None, draw, run, lambda text: call(hub.tell, text, "placed"))
     server = Server(access, hub, run, desk)
     await server.start(sock)
-    run.start()
+    if started:
+        run.start()
     desk.start()
     connector = aiohttp.TCPConnector(limit=0)
     async with aiohttp.ClientSession(connector=connector) as session:
@@ -101,11 +102,11 @@ async def serving() -> AsyncIterator[Live]:
     assert run.failure is None
 
 
-def served(test: Callable[[Live], Awaitable[None]]) -> None:
-    """Run a test with a server."""
+def served(test: Callable[[Live], Awaitable[None]], started: bool = True) -> None:
+    """Run a test with a server, whose run the test starts where it is not ``started``."""
 
     async def main() -> None:
-        async with serving() as live, asyncio.timeout(600):
+        async with serving(started) as live, asyncio.timeout(600):
             await test(live)
 
     asyncio.run(main())
@@ -123,6 +124,7 @@ class Eyes:
         self.serial = 0
         self.bytes = 0
         self.saved = ""
+        self.held: dict[str, Any] = {}
         #: items (connections, then neurons) with the least and the largest value of each bin
         self.traces: dict[int, np.ndarray[Any, Any]] = {}
 
@@ -145,6 +147,9 @@ class Eyes:
         if data[0] == FILE:
             self.saved = data[4 + struct.unpack_from("<H", data, 2)[0] :].decode()
             return FILE
+        if data[0] == HELD:
+            self.held = json.loads(gzip.decompress(data[4:]))
+            return HELD
         if data[0] == TRACE:
             _, _, count, _, _, bins = struct.unpack_from("<BxHIdII", data)
             items, names = np.frombuffer(data, "<u4", 2 * count, 24).reshape(2, count)
@@ -372,6 +377,22 @@ def test_many_who_ask_for_traces_are_answered_in_turn_and_cost_the_run_little() 
             await crowd[0].until(lambda: crowd[0].step > here + 20)
 
     served(test)
+
+
+def test_whoever_asks_before_there_is_a_picture_is_answered_when_there_is_one() -> None:
+    async def test(live: Live) -> None:
+        async with live.stream(live.access.viewer) as stream, live.stream(live.access.viewer) as other:
+            both = [Eyes(one) for one in (stream, other)]
+            for eyes in both:
+                await eyes.ask("trace", items=["n0"], first=0, every=1, bins=8)
+                await eyes.ask("connections", of="n0")
+                await eyes.ask("pause")
+                await eyes.until(lambda eyes=eyes: "refused" in [told["type"] for told in eyes.told])  # type: ignore[misc]
+            live.run.start()
+            for eyes in both:
+                await eyes.until(lambda eyes=eyes: bool(eyes.traces and eyes.held))  # type: ignore[misc]
+
+    served(test, started=False)
 
 
 def test_one_who_comes_while_it_stands_still_sees_the_same() -> None:

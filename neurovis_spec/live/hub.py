@@ -223,7 +223,11 @@ class Hub:
         if client.wanted is None:
             self._waiting.append(client)
         client.wanted = wanted
-        if self._reader is None:
+        self._read_soon()
+
+    def _read_soon(self) -> None:
+        """Have traces read if somebody waits for some, as soon as there is a picture."""
+        if self._waiting and self._reader is None and self._shown is not None:
             self._reader = self._loop.call_at(self._rest, self._read_traces)
 
     def _read_traces(self) -> None:
@@ -242,8 +246,7 @@ class Hub:
             )
             client.wake.set()
         self._rest = self._loop.time() + _REST * (time.thread_time() - begun)
-        if self._waiting:
-            self._reader = self._loop.call_at(self._rest, self._read_traces)
+        self._read_soon()
 
     def _traces(self, view: View, history: History, items: tuple[str, ...], bins: Bins, kind: int) -> bytes:
         found = {item: view.members(item) for item in items}
@@ -260,7 +263,11 @@ class Hub:
         if not client.held:
             self._holding.append(client)
         client.held = item
-        if not self._looking:
+        self._look_soon()
+
+    def _look_soon(self) -> None:
+        """Look up connections if somebody waits for some and none are looked up, as soon as there is a picture."""
+        if self._holding and not self._looking and self._shown is not None:
             self._look_up()
 
     def close(self, client: Client, boxes: tuple[str, ...]) -> None:
@@ -299,12 +306,11 @@ class Hub:
                 self._looking = False
                 if not found.cancelled() and found.exception() is None:
                     client.tell(found.result())
-                if self._holding:
-                    self._look_up()
+                self._look_soon()
 
             self._loop.run_in_executor(None, look).add_done_callback(answer)
-        elif self._holding:
-            self._look_up()
+        else:
+            self._look_soon()
 
     def drawn(self, client: Client, serial: int) -> None:
         """A client has drawn a frame, and so those before it."""
@@ -436,6 +442,8 @@ class Hub:
                 client.wake.set()
         if self._timer is None:
             self._timer = self._loop.call_at(self._next, self._wake_viewers)
+        self._read_soon()
+        self._look_soon()
 
     def _wake_viewers(self) -> None:
         """Send viewers the latest frame; the more there are, the longer until the next."""
