@@ -102,7 +102,7 @@ export function plane(strip, { first, ranges }, values, beyond, called) {
   context.strokeStyle = style.borderTopColor;
   context.strokeRect(0.5, 0.5, wide - 1, height - 1);
   context.strokeStyle = context.fillStyle = style.color;
-  context.lineWidth = 1.2;
+  context.lineWidth = 1;
   context.lineJoin = 'round';
   const went = otherAcross && otherUp && path(otherAcross, otherUp, PALE);
   path(across, up, 0.6);

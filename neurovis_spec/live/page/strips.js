@@ -36,6 +36,10 @@ const RASTER = '*';
 
 /** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is, and how pale that of a future that was left; how many characters an end of an axis has room for; milliseconds between two traces that are asked for, and until one is asked for again. */
 const PINS = 8;
+/** How wide a curve is, in pixels: one is drawn forty times as quickly as a little more, which has an outline; and how many
+ * bins are drawn in one go, as what an outline costs grows faster than its length. */
+const THIN = 1,
+  STRETCH = 32;
 /** The most that is drawn at once: what joined curves are besides is left out. */
 const TRACED = 24,
   MARK = 6,
@@ -586,7 +590,7 @@ export class Strips {
     context.stroke();
     context.setLineDash([]);
     context.strokeStyle = ink;
-    context.lineWidth = 1.2;
+    context.lineWidth = THIN;
     context.lineJoin = 'round';
     for (let bin = 0; fired && 2 * bin < fired.length; bin++) {
       const share = fired[2 * bin + 1];
@@ -608,11 +612,11 @@ export class Strips {
     }
     if (left) {
       context.globalAlpha = FAINT;
-      context.lineWidth = 1.2;
+      context.lineWidth = THIN;
       follow(context, left, middle, y);
     }
     context.globalAlpha = 1;
-    context.lineWidth = 1.2;
+    context.lineWidth = THIN;
     for (const [at, other] of joined.entries()) {
       context.strokeStyle = COLOURS[at % COLOURS.length];
       follow(context, other, middle, y);
@@ -648,6 +652,11 @@ function follow(context, trace, x, y) {
   context.beginPath();
   let before = NaN;
   for (let bin = 0; 2 * bin < trace.length; bin++) {
+    if (bin % STRETCH === 0 && bin > 0) {
+      context.stroke();
+      context.beginPath();
+      if (!Number.isNaN(before)) context.moveTo(x(bin - 1), y(before));
+    }
     const [least, most] = [trace[2 * bin], trace[2 * bin + 1]],
       at = x(bin);
     if (!Number.isNaN(least)) {
