@@ -111,7 +111,7 @@ class Piece:
     @property
     def framed(self) -> bool:
         """Whether a line is drawn around it."""
-        return self.part.module >= 0 or self.part.box >= 0
+        return self.part.framed
 
     def titled_above(self, flip: bool) -> Piece:
         """The same where it is known whether it is reflected: with room for its title on its upper side alone."""

@@ -44,7 +44,7 @@ class PageCost:
         self._lines: IntArray = np.array(lines, dtype=np.int64).reshape(-1, 2)
         self._apart = _unrelated(self._lines)
 
-    def __call__(self, places: Sequence[Point], rect: Rect) -> float:
+    def __call__(self, places: Sequence[Point] | FloatArray, rect: Rect) -> float:
         """What it costs that neurons stand at these places, and all within this frame."""
         wide, high = sides(rect, self._problem.direction)
         centres = np.array(places, dtype=np.float64).reshape(-1, 2)

@@ -11,15 +11,18 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import TypeAlias
+
+import numpy as np
 
 from neurovis_layouts.alike import Move, shifted_by
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.drawing import Drawing, Piece
 from neurovis_layouts.layered.page_cost import PageCost
 from neurovis_layouts.layered.parts import Part, imaged, part_of_module, symmetric
-from neurovis_layouts.layered.plan_places import Slot, placed
+from neurovis_layouts.layered.plan_places import Footprint, PlanPlaces, Slot, footprint
+from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.geometry import Rect, united
 from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point, Seat
 
@@ -159,6 +162,15 @@ class _Shape:
         return replace(self, flips=tuple(flip != (k in own) for k, flip in enumerate(self.flips)))
 
 
+@dataclass(frozen=True, slots=True)
+class _Stance:
+    """A part as it is drawn, what it takes up so, and where its neurons are (n, 2)."""
+
+    piece: Piece
+    footprint: Footprint
+    places: FloatArray
+
+
 class _Page:
     """Parts in their slots, to be drawn in one direction or another."""
 
@@ -171,8 +183,10 @@ class _Page:
         sketched: Drawn,
         upright: bool,
     ) -> None:
-        self._problem, self._parts, self._slots, self._pair = problem, parts, slots, pair
+        self._problem, self._parts, self._pair = problem, parts, pair
         self._sketched, self._upright = sketched, upright
+        self._places = PlanPlaces(problem, slots, parts, _page(problem), bool(pair))
+        self._sketch = cache(partial(self._stance, sketched))
         owner = {m: k for k, part in enumerate(parts) for m in part.members}
         between = [(e.source, e.target) for e in problem.edges if owner[e.source] != owner[e.target]]
         # from part to part all ways are as good
@@ -198,10 +212,25 @@ class _Page:
 
     def stood(self, shape: _Shape, drawn: Drawn) -> list[tuple[Piece, Move]]:
         """The parts drawn in a shape, and where they stand."""
-        pieces = [drawn(part, turn) for part, turn in zip(self._parts, shape.turns, strict=True)]
+        stances = list(map(partial(self._stance, drawn), self._parts, shape.turns, shape.flips))
+        moves = self._moves(stances)
+        return [(stance.piece, moves[k]) for k, stance in enumerate(stances)]
+
+    def _stance(self, drawn: Drawn, part: Part, turn: Direction, flip: bool) -> _Stance:
+        """A part as drawn in a direction, and as the mirror image if ``flip``."""
+        piece = drawn(part, turn)
         if self._upright:
-            pieces = [piece.titled_above(flip) for piece, flip in zip(pieces, shape.flips, strict=True)]
-        return _placed(self._problem, self._slots, self._parts, pieces, shape.flips, bool(self._pair))
+            piece = piece.titled_above(flip)
+        return _Stance(piece, footprint(piece, flip), np.array(piece.drawing.places))
+
+    def _moves(self, stances: Sequence[_Stance]) -> dict[int, Move]:
+        """How each part is moved, mirror images as reflections of each other."""
+        moves = self._places.moves([stance.footprint for stance in stances])
+        for k, part in enumerate(self._parts):
+            if part.image_of >= 0:
+                (dx, dy), flipped = moves[part.image_of].shift, moves[part.image_of].mirrored
+                moves[k] = shifted_by((-dx + 0.0, dy), not flipped)
+        return moves
 
     def _settled(self, shape: _Shape) -> _Shape:
         """The best that is found by turning one make of parts after the other."""
@@ -228,12 +257,12 @@ class _Page:
         return other if self._cost(other) < self._cost(shape) - _NOTHING else shape
 
     def _cost_of(self, shape: _Shape) -> float:
-        moved = self.stood(shape, self._sketched)
-        at: dict[int, Point] = {}
-        for piece, move in moved:
-            at.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
-        places = [at[i] for i in range(len(at))]
-        return self._page_cost(places, united(move.rect(piece.rect) for piece, move in moved))
+        stances = list(map(self._sketch, self._parts, shape.turns, shape.flips))
+        moves = self._moves(stances)
+        places = np.empty((sum(len(part.members) for part in self._parts), 2))
+        for k, (part, stance) in enumerate(zip(self._parts, stances, strict=True)):
+            places[list(part.members)] = moves[k].shift + moves[k].flip * stance.places
+        return self._page_cost(places, united(moves[k].rect(one.piece.rect) for k, one in enumerate(stances)))
 
 
 def _directions(problem: LayoutProblem, part: Part, pair: Mapping[int, int], drawn: Drawn) -> tuple[Direction, ...]:
@@ -331,20 +360,3 @@ def _check_mirrors(
                 "put mirror images into one row, as far to the left as to the right of the middle",
                 (one,),
             )
-
-
-def _placed(
-    problem: LayoutProblem,
-    slots: Sequence[Slot],
-    parts: Sequence[Part],
-    pieces: Sequence[Piece],
-    flips: Sequence[bool],
-    even: bool,
-) -> list[tuple[Piece, Move]]:
-    """Each of the pieces where it stands, mirror images as reflections of each other."""
-    moves = placed(problem, slots, _page(problem), pieces, flips, even)
-    for k, part in enumerate(parts):
-        if part.image_of >= 0:
-            (dx, dy), flipped = moves[part.image_of].shift, moves[part.image_of].mirrored
-            moves[k] = shifted_by((-dx + 0.0, dy), not flipped)
-    return [(piece, moves[k]) for k, piece in enumerate(pieces)]

@@ -25,6 +25,11 @@ class Part:
     family: str = ""
     image_of: int = -1
 
+    @property
+    def framed(self) -> bool:
+        """Whether a line is drawn around it."""
+        return self.module >= 0 or self.box >= 0
+
 
 def parts_of(problem: LayoutProblem, boxes: AbstractSet[int], pair: Mapping[int, int]) -> list[Part]:
     """The parts in the order of their first neurons; those of which the second is a mirror image come first.
