@@ -14,7 +14,7 @@ import pytest
 from chromium import Page, chromium
 from live_window import Area, area_of
 from PIL import Image
-from test_live_browser import SPECS, STEP, pause
+from test_live_browser import SPECS, STEP, pause, shown
 from test_live_drawing import opened as drawn_alone
 
 import neurovis_spec as nv
@@ -189,5 +189,30 @@ def test_labels_grow_with_zoom_and_can_be_read_where_they_recede(tmp_path: Path)
                 pixels = image.crop((at[0] - 14, at[1] - 14, at[0] + 14, at[1] + 14))
                 levels = np.asarray(pixels)
                 assert levels.min() < 110 < 200 < levels.max(), "dark ink on what is pale"
+
+    asyncio.run(main())
+
+
+@pytest.mark.browser
+def test_curves_beside_a_network_are_as_high_as_there_is_room_for(tmp_path: Path) -> None:
+    """And stay where they are when something is held; with more of them each is lower, but none is hidden."""
+
+    async def main() -> None:
+        async with shown("cpg_printed.yaml", tmp_path, curves=True) as (opened, _, _):
+            await opened.size(1280, 800)
+            heights = "[...document.querySelectorAll('.trace')].map((one) => one.offsetHeight).join()"
+            await opened.until(f"{heights} == '150,0'")
+            await opened.until("document.querySelector('.trace').height == 150")
+            stood = await box(opened, "#strips canvas")
+            await opened.key("]")
+            await opened.until(f"{heights} == '150,150'")
+            assert await box(opened, "#strips canvas") == stood
+            for measure in ("C1 - C2", "C1 * C2", "abs(C1)", "abs(C2)"):
+                await opened.ask(f"measure.value = {json.dumps(measure)}; measuring.requestSubmit()")
+            await opened.until("document.querySelectorAll('.trace').length == 6")
+            await opened.until(f"new Set({heights}.split(',')).size == 1 && parseInt({heights}) < 90")
+            assert await opened.ask("past.scrollHeight <= past.clientHeight + 4")
+            await opened.size(1280, 1000)
+            await opened.until(f"parseInt({heights}) > 90")
 
     asyncio.run(main())

@@ -23,6 +23,13 @@ const WIDE = 1.3,
   BROAD = 432,
   HALF = 0.45,
   BELOW = 220;
+/** How high a curve beside the network is at least: this share of the window, but so many pixels, and no more than so many;
+ * how high at most where there is room; and how high the name is of what is held. */
+const TRACE = 0.09,
+  LOWEST = 40,
+  HIGH = 90,
+  HIGHEST = 150,
+  HELD = 34;
 /** What is left free around the legend; in a window narrower than this it is folded. */
 const GAP = 10,
   TELEPHONE = 600;
@@ -115,7 +122,7 @@ export class Room {
     /** @type {number[][]} */
     this.taken = [];
     new ResizeObserver(() => this.arrange()).observe(find('shown'));
-    new ResizeObserver(() => this.place()).observe(find('past'));
+    for (const one of ['past', 'strips']) new ResizeObserver(() => this.place()).observe(find(one));
     new MutationObserver(() => this.arrange()).observe(find('embodied'), { attributeFilter: ['hidden'] });
     legend.panel.addEventListener('toggle', () => this.place());
   }
@@ -161,10 +168,25 @@ export class Room {
       wide = find('past').clientWidth - 2 * GAP,
       { size } = legend.flow(wide);
     panel.style.translate = '';
-    const body = find('embodied').hidden ? 0 : find('embodied').scrollHeight;
-    const free = find('shown').clientHeight - find('past').offsetHeight - legend.heading.offsetHeight - 2 * GAP;
+    const body = find('embodied').hidden ? 0 : find('embodied').scrollHeight,
+      { count, least, beside } = this.curves(),
+      free = find('shown').clientHeight - beside - count * least - legend.heading.offsetHeight - 2 * GAP;
     if (!legend.isChosen) panel.open = size[1] <= free - Math.min(body, 200);
     legend.draw(wide);
+    // as high as there is room for, unless a body is shown there; what is held has room before it is
+    const all = count + (find('strips').classList.contains('nothing') ? 1 : 0),
+      held = HELD * (all - count);
+    const each = Math.floor((find('shown').clientHeight - panel.offsetHeight - beside - held) / all);
+    document.body.style.setProperty('--trace', `${body ? least : Math.max(least, Math.min(HIGHEST, each))}px`);
+  }
+
+  /** How many curves there are, how high each is at least, and how high all else is of what stands with them. */
+  curves() {
+    const { find } = this,
+      traces = /** @type {NodeListOf<HTMLElement>} */ (find('strips').querySelectorAll('.trace:not(.raster, .plane)')),
+      heights = [...traces].map(({ offsetHeight }) => offsetHeight).filter(Boolean);
+    const least = Math.max(LOWEST, Math.min(HIGH, TRACE * innerHeight));
+    return { count: heights.length, least, beside: find('past').scrollHeight - heights.reduce((a, b) => a + b, 0) };
   }
 
   /** In the corner of the picture where nothing lies, as wide as it may be there, else folded into the line of the title. */

@@ -7,6 +7,7 @@ import { again, COLOURS, offer, plane, taken } from './joining.js';
 import { namesOf } from './protocol.js';
 import { THUMB } from './scrubber.js';
 import { Seldom } from './seldom.js';
+import { Sized } from './sized.js';
 import { dot } from './spikes.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
@@ -68,6 +69,7 @@ export class Strips {
   constructor(link, attention, beside, scrubber, axis, place, under) {
     this.axis = axis;
     this.under = under;
+    this.size = new Sized(place, () => this.show());
     this.link = link;
     this.attention = attention;
     this.beside = beside;
@@ -474,6 +476,7 @@ export class Strips {
       low,
       high,
       width,
+      this.size.high,
       devicePixelRatio,
       events.length,
       turned.length,
