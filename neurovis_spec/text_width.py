@@ -41,6 +41,20 @@ def width(text: str, size: float, weight: int = 400, subscript: str = "") -> flo
     return total * size / 100
 
 
+def fitting(text: str, size: float, room: float, weight: int = 400) -> int:
+    """How many characters of a text, from its first, fit into ``room`` user units.
+
+    >>> fitting("extraordinarily", 10, 40)
+    7
+    """
+    table, total = _TABLES[weight >= 600], 0
+    for count, character in enumerate(text):
+        total += table.get(character, 0) or _other(character)
+        if float(total) * size / 100 > room:
+            return count
+    return len(text)
+
+
 def _other(character: str) -> int:
     if unicodedata.combining(character):
         return 0

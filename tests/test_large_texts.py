@@ -13,7 +13,7 @@ from neurovis_spec.compiler.names import size_estimate
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.yaml import brackets, refusals
 from neurovis_spec.language.yaml.reader import read_text
-from neurovis_spec.scene.texts import Cut
+from neurovis_spec.scene.texts import Cut, parts_of, width, wrapped
 
 HEAD = "neurovis: 1\nname: x\n"
 LONG = "W" * 100_000
@@ -61,6 +61,24 @@ def test_an_end_is_shown_where_two_names_begin_alike(names: list[str], name: str
     begins = [one for one in {*names, name} if len(one) > len(shown[:-1]) and one.startswith(shown[:-1])]
     if shown and shown != name and shown.endswith("…") and shown != "…":
         assert len(begins) < 2
+
+
+@given(text=st.text("aWi\u0301 _-", max_size=40), room=st.floats(0.5, 90), weight=st.sampled_from([400, 600]))
+def test_lines_are_those_of_a_text_that_is_measured_letter_by_letter(text: str, room: float, weight: int) -> None:
+    """Each line has as many parts, and a part that is wider by itself as many letters, as fit, but at least one."""
+    expected = [""]
+    for between, part in parts_of(text):
+        if width(expected[-1] + between + part, 10, weight) <= room:
+            expected[-1] += between + part
+            continue
+        expected += [""] if expected[-1] else []
+        for letter in part:
+            begun = expected[-1] + letter
+            if expected[-1] and width(begun, 10, weight) > room:
+                expected.append(letter)
+            else:
+                expected[-1] = begun
+    assert wrapped(text, 10, room, weight) == expected
 
 
 @pytest.mark.parametrize(

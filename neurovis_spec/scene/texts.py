@@ -11,7 +11,7 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 
-from neurovis_spec.text_width import FAMILIES, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, width, with_subscript
+from neurovis_spec.text_width import FAMILIES, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, fitting, width, with_subscript
 
 #: A part of a word behind which a line may end.
 _PARTS = re.compile(r"[^_\-./]*[_\-./]+|[^_\-./]+")
@@ -64,8 +64,7 @@ def wrapped(text: str, size: float, room: float, weight: int = 400) -> list[str]
             continue
         if lines[-1]:
             lines.append("")
-        while width(word, size, weight) > room and len(word) > 1:
-            end = bisect_right(range(1, len(word)), room, key=lambda end: width(word[:end], size, weight))
+        while len(word) > 1 and (end := fitting(word, size, room, weight)) < len(word):
             lines[-1:] = [word[: max(end, 1)], ""]
             word = word[max(end, 1) :]
         lines[-1] = word

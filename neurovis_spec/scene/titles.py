@@ -104,7 +104,7 @@ def _in_slot(
     found: dict[int, _Title] = {}
     for i, (item, around) in boxes.items():
         taken = [*kept, *(title.taken for title in found.values())]
-        said = _Said(words := item.box.name if short else item.box.title, (words,), size)
+        said = _said(words := item.box.name if short else item.box.title, (words,), size, item.box.kind)
         for title in _at(item, said, slot, around, taken, _TOO_MUCH):
             if title.hits < _TOO_MUCH and title.taken[2] + slot.inset < item.rect[2] + 1.01:
                 found[i] = title
@@ -162,15 +162,17 @@ def _alike(boxes: Sequence[Titled]) -> list[list[int]]:
 
 @dataclass(frozen=True, slots=True)
 class _Said:
-    """What a title says, the lines of that, and how large these are."""
+    """What a title says, the lines of that, how large these are, and how wide."""
 
     words: str
     lines: tuple[str, ...]
     size: float
+    width: float
 
-    def wide(self, kind: str) -> float:
-        """How wide it is at the head of a box of this kind."""
-        return max(texts.width(line, self.size, _WEIGHTS[kind]) for line in self.lines)
+
+def _said(words: str, lines: Sequence[str], size: float, kind: str) -> _Said:
+    """What a title says at the head of a box of this kind."""
+    return _Said(words, tuple(lines), size, max(texts.width(line, size, _WEIGHTS[kind]) for line in lines))
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,11 +191,11 @@ class _Wording:
         room, across = item.room[2] - item.room[0], item.rect[2] - item.rect[0]
         words = item.box.title if self.whole else item.box.name
         most = self.share * min(room, across) if self.share else room
-        lines = tuple(texts.wrapped(words, self.size, most, weight))
+        said = _said(words, texts.wrapped(words, self.size, most, weight), self.size, item.box.kind)
         if not self.share or self.broken:
-            return _Said(words, lines, self.size)
+            return said
         narrow = max(texts.width(part, self.size, weight) for _, part in texts.parts_of(words)) > most
-        return None if narrow or len(lines) > _LINES else _Said(words, lines, self.size)
+        return None if narrow or len(said.lines) > _LINES else said
 
 
 #: best first: all, the name, the name in small; in lines; in as many as it takes
@@ -304,7 +306,7 @@ def _at(
     """A title in a slot and in its mirror image, as far as there is room; none along a row of a frame that is not as
     wide. What is ``kept`` is too much to cover, a ``foreign`` frame as much as is said."""
     (x0, y0, x1, y1), (low, top, high, bottom) = item.rect, item.room
-    size, width, more = said.size, said.wide(item.box.kind), (len(said.lines) - 1) * LINE * said.size
+    size, width, more = said.size, said.width, (len(said.lines) - 1) * LINE * said.size
     rise, drop = slot.gap + _HEIGHT * size, slot.gap + _DEPTH * size
     y = (y0 + rise, y1 - drop - more, y0 - drop - more, y1 + rise)[slot.row]
     inset = slot.inset + slot.aside * width
