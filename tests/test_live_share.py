@@ -264,11 +264,14 @@ def test_a_view_of_the_matrix_or_of_pathways_is_kept_called_otherwise_and_delete
             await opened.ask(press.format("rename weights"))
             await opened.ask("document.activeElement.value = ' of  numbers'")
             await opened.key("Enter")
-            await opened.until(f"{there} == 'plain,of numbers,ways'")
-            await opened.ask(press.format("delete plain"))
-            await opened.until(f"{there} == 'of numbers,ways'")
-            await opened.ask(undo)
-            await opened.until(f"{there} == 'plain,of numbers,ways'")
+            await opened.until(f"{there} == 'plain,of  numbers,ways'")
+            seen = "[...document.querySelectorAll('#views .go')].map((one) => one.innerText)"
+            assert await opened.ask(seen) == ["plain", "of  numbers", "ways"], "both blanks are seen"
+            for name in ("plain", "of  numbers"):  # what is undone is called as it was
+                await opened.ask(press.format(f"delete {name}"))
+                await opened.until(f"!{there}.split(',').includes('{name}')")
+                await opened.ask(undo)
+                await opened.until(f"{there} == 'plain,of  numbers,ways'")
             await opened.ask(undo)
             await opened.until(f"{there} == 'plain,weights,ways'")
             findings = Findings()

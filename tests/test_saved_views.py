@@ -17,11 +17,11 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.diagnostics import Findings, SpecError
 from neurovis_spec.live.clock import SPEEDS
-from neurovis_spec.live.commands import Keep, Rekeep, Unkeep
+from neurovis_spec.live.commands import Keep, Rekeep, Rename, Unkeep
 from neurovis_spec.live.desk import Desk, Written
 from neurovis_spec.live.protocol import ProtocolError, command_of, views_message
 from neurovis_spec.live.run import Run
-from neurovis_spec.live.saved_views import SHOWN, SavedView, call, file_beside, forget, keep, views_in
+from neurovis_spec.live.saved_views import SHOWN, SavedView, call, file_beside, forget, keep, restore, views_in
 from neurovis_spec.live.show import Show
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.view import view_of
@@ -162,6 +162,27 @@ def test_a_view_without_some_keys_is_put_back_without_them(tmp_path: Path) -> No
     ]  # fmt: skip
 
 
+def test_blanks_in_a_name_stay_as_they_were_typed(tmp_path: Path) -> None:
+    path, view = tmp_path / "x.neurovis-view.yaml", SavedView(3)
+
+    def names() -> list[str]:
+        findings = Findings()
+        found = list(views_in(path, NETWORK, findings))
+        assert not findings.sorted()
+        return found
+
+    for name in ("my view", "my  view", "my: view", "my:  view"):
+        keep(path, name, view)
+    keep(path, "my  view", SavedView(4))
+    assert names() == ["my view", "my  view", "my: view", "my:  view"]
+    assert restore(path, forget(path, "my  view"))
+    call(path, "my view", "a   view")
+    call(path, "my  view", "my view")
+    assert names() == ["a   view", "my view", "my: view", "my:  view"]
+    forget(path, "a   view")
+    assert views_in(path, NETWORK, Findings())["my view"] == SavedView(4)
+
+
 WRONG = """\
 neurovis_view: 1
 views:
@@ -213,10 +234,12 @@ def test_a_page_sends_all_of_a_view_and_is_told_all_of_them() -> None:
     def message(**more: object) -> str:
         return json.dumps({"type": "keep", "name": " a  b", "view": {**view, **more}})
 
-    assert command_of(message()) == Keep("a b", wanted)
-    assert command_of(message(**dict.fromkeys(view))) == Keep("a b", SavedView())
+    assert command_of(message()) == Keep("a  b", wanted)
+    assert command_of(message(**dict.fromkeys(view))) == Keep("a  b", SavedView())
     assert command_of('{"type": "unkeep", "name": "a  b"}') == Unkeep("a  b")
-    assert command_of('{"type": "rekeep", "name": "a  b", "to": " c  d"}') == Rekeep("a  b", "c d")
+    assert command_of('{"type": "rekeep", "name": "a  b", "to": " c  d"}') == Rekeep("a  b", "c  d")
+    assert command_of('{"type": "rekeep", "name": "a", "to": "c\\t\\u00a0d "}') == Rekeep("a", "c  d"), "blanks"
+    assert command_of('{"type": "rename", "number": 0, "name": " a  b "}') == Rename(0, "a  b"), "a branch, too"
     assert json.loads(views_message("x", {"a": wanted}, ""))["views"] == {"a": {**view, "window": None}}
     for wrong in (
         {"step": -1}, {"speed": "3"}, {"camera": [0, 1, 2]}, {"camera": [1, 2]}, {"curves": [3]}, {"theme": "x"},
@@ -226,7 +249,7 @@ def test_a_page_sends_all_of_a_view_and_is_told_all_of_them() -> None:
             command_of(message(**wrong))
     with pytest.raises(ProtocolError):
         command_of(json.dumps({"type": "keep", "name": " ", "view": view}))
-    assert command_of(message(camera="whole")) == Keep("a b", replace(wanted, camera="whole"))
+    assert command_of(message(camera="whole")) == Keep("a  b", replace(wanted, camera="whole"))
     long = json.dumps({"type": "keep", "name": 200 * "x", "view": view})
     assert command_of(long) == Keep(200 * "x", wanted), "an author may write a longer name than a page has typed"
 

@@ -471,7 +471,12 @@ def _measure_text(value: object) -> str:
 def _called(value: object) -> str:
     if not isinstance(value, str) or len(value) > _CALLED:
         raise ProtocolError(f"a name of at most {_CALLED} characters is wanted")
-    return " ".join(value.split())
+    return _spaced(value)
+
+
+def _spaced(name: str) -> str:
+    """A name as it was typed, without what is blank at its ends; a tab within it is a blank."""
+    return "".join(" " if one.isspace() else one for one in name.strip())
 
 
 def _truth(value: object) -> bool:
@@ -522,7 +527,7 @@ def _texts(value: object) -> tuple[str, ...]:
 
 
 def _view_name(value: object) -> str:
-    name = " ".join(_name(value).split())
+    name = _spaced(_name(value))
     if not name:
         raise ProtocolError("a name is wanted")
     return name

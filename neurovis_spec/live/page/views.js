@@ -20,8 +20,8 @@ const JOINING = / (over|with|against) /;
 const LONGEST = 500,
   LARGEST = 12000;
 
-/** A name as the file has it. @param {string} name @returns {string} */
-const spaced = (name) => name.trim().replaceAll(/\s+/g, ' ');
+/** A name as the file has it: as it was typed, without what is blank at its ends. @param {string} name @returns {string} */
+const spaced = (name) => name.trim().replaceAll(/\s/g, ' ');
 
 /** The views that are saved. */
 export class Views {
