@@ -109,7 +109,9 @@ def test_a_link_goes_to_its_branch_and_says_where_it_cannot(tmp_path: Path) -> N
             await opened.until(f"{CURVES}.length == 4")
             await opened.ask(JOIN.format(0, "with K2"))
             await opened.ask(JOIN.format(1, "against T"))
-            await opened.until(f"{said.format('curves')} == 'C1~+K2\\nO~/T\\nT' && {said.format('branch')} == '0'")
+            await opened.until(
+                f"{said.format('curves')} == 'C1 with K2\\nO against T\\nT' && {said.format('branch')} == '0'"
+            )
             first, curves = await opened.ask("location.href"), await opened.ask(CURVES)
             assert isinstance(curves, list)
             assert curves[:2] == ["C1 and K2", "O against T"]
@@ -280,6 +282,56 @@ def test_a_view_of_the_matrix_or_of_pathways_is_kept_called_otherwise_and_delete
             assert [(name, one.shows) for name, one in found.items()] == [
                 ("plain", "network"), ("weights", "matrix"), ("ways", "pathways")
             ]  # fmt: skip
+
+    asyncio.run(main())
+
+
+#: A network that has a curve of each kind, and a neuron that is called as a page calls an error.
+NAMED = """neurovis: 1
+name: named
+time: {dt: 0.05, steps: 400}
+models: {cell: {state: {v: {initial: 0, derivative: drive - v}, u: {initial: 0, derivative: v - u}}, activity: v}}
+inputs: {touch: {expression: sin(k/9)}}
+neurons:
+  N: {count: 3, model: cell, bias: i}
+  e0: {activation: tanh, bias: 0.2}
+  T: {input: touch}
+  O: {}
+connections:
+  - N1 -> N2: 0.5
+  - N1 -> N2: 0.1
+  - N3 -> O: {weight: 0.1, plasticity: {delta: {rate: 0.01, target: T}}}
+"""
+#: The same curves as links had them first, and as links and files of views have them.
+OF_OLD = "O~T\nN2|u~+N1 -> N2 (2)\ni0~+e0\nN3~/N2|u\nm0"
+BY_NAME = ["O over T", "N2.u with N1 -> N2 (2)", "touch with e0", "N3 against N2.u", "rms(T - O, last=9)"]
+OPENED = ["O and T", "N2.u and N1 → N2 (2)", "touch and e0", "N3 against N2.u", "rms(T - O, last=9)"]
+
+
+def test_curves_have_the_same_names_in_links_of_now_and_of_old_and_in_files(tmp_path: Path) -> None:
+    said = "new URLSearchParams(location.hash.slice(1)).get('curves')"
+    (tmp_path / "named.yaml").write_text(NAMED)
+    views = f"neurovis_view: 1\nviews:\n  old:\n    curves: {json.dumps(BY_NAME)}\n"
+    file_beside(tmp_path / "named.yaml").write_text(views)
+
+    async def main() -> None:
+        async with at_hand(tmp_path, str(tmp_path / "named.yaml")) as (opened, _, _):
+            await opened.until(f"{STEP} > 20")
+            await pause(opened)
+            url = str(await opened.ask("location.href")).partition("#")[0]
+            await opened.ask(TYPED.format("'rms(T - O, last=9)'"))
+            await opened.until(f"{CURVES}.length == 2")
+            for curves in (OF_OLD, "\n".join(BY_NAME), None):
+                await opened.call("Page.navigate", url="about:blank")
+                if curves is None:
+                    await opened.call("Page.navigate", url=f"{url}#saved=old")
+                else:
+                    await opened.call("Page.navigate", url=f"{url}#curves={quote(curves)}")
+                await opened.until(f"{CURVES}.join() == {json.dumps(','.join(OPENED))}")
+                await opened.until(f"{said} == {json.dumps(chr(10).join(BY_NAME))}")
+            await opened.call("Page.navigate", url="about:blank")
+            await opened.call("Page.navigate", url=f"{url}#curves={quote('N1~nobody~T' + chr(10) + 'nobody~T|v')}")
+            await opened.until(f"{CURVES}.join() == 'N1 and T'")
 
     asyncio.run(main())
 

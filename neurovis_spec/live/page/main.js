@@ -11,6 +11,7 @@ import { Branches } from './branches.js';
 import { Camera } from './camera.js';
 import { channels, luminance } from './colours.js';
 import { Controls, part } from './controls.js';
+import { CurveNames } from './curvenames.js';
 import { Fitting } from './fitting.js';
 import { listKeys } from './keys.js';
 import { Legend } from './legend.js';
@@ -289,8 +290,17 @@ const body = new Body(part('embodied'), part('posed'), part('bodily'), part('spa
 const fitting = new Fitting(link, part('shown'), part('fitting'), () =>
   refusal.tell('the part that was seen is of another layout of the network than the one that is shown'),
 );
-const share = new Share(link, camera, strips, attention, controls, body, redraw, part, branches, fitting, (words) =>
-  refusal.tell(words),
+const share = new Share(
+  link,
+  camera,
+  new CurveNames(strips),
+  controls,
+  body,
+  redraw,
+  part,
+  branches,
+  fitting,
+  (words) => refusal.tell(words),
 );
 const saves = new Saves(link, body, (done, total) => share.making(done, total), part);
 const views = new Views(share, zoom, turning.appearance, undo, redraw, part);

@@ -2,31 +2,22 @@
  * Sharing: where the page is, in its address, so that a link shows the same; and the picture alone, for a talk.
  */
 
-import { refOf } from './protocol.js';
 import { pixelsOf } from './save.js';
 
-/** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./body.js').Body} Body */
 /** @typedef {import('./branches.js').Branches} Branches */
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {import('./controls.js').Controls} Controls */
+/** @typedef {import('./curvenames.js').CurveNames} CurveNames */
 /** @typedef {import('./fitting.js').Fitting} Fitting */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Scene} Scene */
-/** @typedef {import('./strips.js').Strips} Strips */
 
 /** Pixels within which the picture is where it is as a whole; how often the address is brought up to date, in milliseconds; how long it is told that something was copied. */
 const HALF = 0.5,
   PACE = 500,
   TOLD = 1500;
-/** What parts an item from what of it is shown, and items in one strip: no name has them; and what stands before an item that
- * is joined, and before one that it is drawn against: no name begins so. */
-const OF = '|',
-  WITH = '~',
-  JOINED = '+',
-  AGAINST = '/';
-
 /** The window of a picture that is laid out as anywhere. */
 export const USUAL = 'default';
 
@@ -35,14 +26,13 @@ const number = (text) => (text && Number.isFinite(Number(text)) ? Number(text) :
 
 /** What of a page a link holds. */
 export class Share {
-  /** @param {Link} link @param {Camera} camera @param {Strips} strips @param {Attention} attention @param {Controls} controls
+  /** @param {Link} link @param {Camera} camera @param {CurveNames} curves @param {Controls} controls
    * @param {Body} body @param {() => void} redraw @param {(id: string) => HTMLElement} part
    * @param {Branches} branches @param {Fitting} fitting @param {(words: string) => void} tell says what of a link cannot be shown */
-  constructor(link, camera, strips, attention, controls, body, redraw, part, branches, fitting, tell) {
+  constructor(link, camera, curves, controls, body, redraw, part, branches, fitting, tell) {
     this.link = link;
     this.camera = camera;
-    this.strips = strips;
-    this.attention = attention;
+    this.curves = curves;
     this.controls = controls;
     this.redraw = redraw;
     this.tell = tell;
@@ -113,7 +103,7 @@ export class Share {
   status() {
     if (this.isBegun || !this.link.scene) return;
     this.isBegun = true;
-    this.begun = this.curves();
+    this.begun = this.pinned;
     if (location.protocol === 'about:') return;
     this.restore(new URLSearchParams(location.hash.slice(1)));
     setInterval(() => this.keep(), PACE);
@@ -126,51 +116,9 @@ export class Share {
     });
   }
 
-  /** The name of an item, which another network may have, too. @param {string} key @returns {string} */
-  named(key) {
-    const [id, what] = key.split('.'),
-      data = this.attention.groups.get(id)?.data;
-    const name = (data && refOf(data)) ?? id;
-    return what ? name + OF + what : name;
-  }
-
-  /** The item of a name, '' where there is none. @param {string} named @returns {string} */
-  item(named) {
-    const [name, what] = named.split(OF);
-    for (const { id, data } of this.attention.groups.values()) {
-      if (refOf(data) === name) return what ? `${id}.${what}` : id;
-    }
-    return /^[eims]\d+$/.test(name) && this.strips.group(name) ? name : '';
-  }
-
-  /** The curves that are pinned, by their names. @returns {string} */
-  curves() {
-    return this.strips.pinned
-      .map(({ key, behind, joined, against }) =>
-        [
-          ...[key, ...behind].map((one) => this.named(one)),
-          ...joined.map((one) => JOINED + this.named(one.key)),
-          ...(against ? [AGAINST + this.named(against.key)] : []),
-        ].join(WITH),
-      )
-      .join('\n');
-  }
-
-  /** Pin curves by their names, and nothing else. @param {string} curves */
-  pin(curves) {
-    const pinned = curves.split('\n').flatMap((line) => {
-      const parts = line.split(WITH),
-        names = parts.filter((one) => one[0] !== JOINED && one[0] !== AGAINST),
-        beside = (/** @type {string} */ mark) =>
-          parts
-            .filter((one) => one[0] === mark)
-            .map((one) => this.item(one.slice(1)))
-            .filter(Boolean);
-      const items = names.map((name) => this.item(name)),
-        curve = { items, names: names.map((name) => name.split(OF)[0]) };
-      return items[0] && items.every(Boolean) ? [{ curve, joined: beside(JOINED), against: beside(AGAINST)[0] }] : [];
-    });
-    this.strips.only(pinned);
+  /** The curves that are pinned, by their names, a line each. @returns {string} */
+  get pinned() {
+    return this.curves.pinned.join('\n');
   }
 
   /** Whether the matrix is shown in place of the picture. @returns {boolean} */
@@ -188,7 +136,7 @@ export class Share {
   state() {
     const { controls, link } = this,
       said = new URLSearchParams(),
-      curves = this.curves();
+      curves = this.pinned;
     if (!controls.playing && link.look) said.set('step', String(link.look.step));
     if (!controls.playing || this.branches.isSeveral) said.set('branch', String(this.branches.current));
     if (controls.speed.value !== '1') said.set('speed', controls.speed.value);
@@ -247,7 +195,7 @@ export class Share {
     const view = said.get('view')?.split(' ').map(number) ?? [];
     if (view.length === 3 && !view.includes(null))
       this.fitting.see(said.get('window') ?? USUAL, () => this.see(/** @type {number[]} */ (view)));
-    if (curves !== null) this.pin(curves);
+    if (curves !== null) this.curves.pin(curves.split('\n'));
     const missing = branch === null ? '' : this.branches.go(branch);
     if (missing) this.tell(missing);
     this.run(missing ? null : number(said.get('step')), said.get('speed'));

@@ -3,7 +3,6 @@
  */
 
 import { button, retype } from './naming.js';
-import { refOf } from './protocol.js';
 import { USUAL } from './share.js';
 
 /** @typedef {import('./appearance.js').Appearance} Appearance */
@@ -11,17 +10,27 @@ import { USUAL } from './share.js';
 /** @typedef {import('./protocol.js').Joined} Joined */
 /** @typedef {import('./protocol.js').SavedView} SavedView */
 /** @typedef {import('./share.js').Share} Share */
+/** @typedef {import('./strips.js').Strip} Strip */
 /** @typedef {import('./undo.js').Undo} Undo */
 /** @typedef {import('./zoom.js').Zoom} Zoom */
 
-/** What joins the signals of a curve: behind the first, in the same axis, in a plane. */
-const JOINING = / (over|with|against) /;
 /** The most characters of a measure, and of what is saved. */
 const LONGEST = 500,
   LARGEST = 12000;
 
 /** A name as the file has it: as it was typed, without what is blank at its ends. @param {string} name @returns {string} */
 const spaced = (name) => name.trim().replaceAll(/\s/g, ' ');
+
+/** The ids of the measures that strips show. @param {Strip[]} strips @returns {Set<string>} */
+const measuresIn = (strips) =>
+  new Set(
+    strips
+      .flatMap(({ key, behind, joined, against }) => [
+        ...[key, ...behind, ...joined.map((one) => one.key)],
+        against?.key ?? '',
+      ])
+      .filter((id) => id[0] === 'm'),
+  );
 
 /** The views that are saved. */
 export class Views {
@@ -187,12 +196,7 @@ export class Views {
       step: share.link.look?.step ?? 0,
       speed: share.controls.speed.value,
       camera: share.asMatrix ? null : share.isWhole ? 'whole' : this.units(share.seen(), false),
-      curves: share.strips.pinned.map((strip) => {
-        const [first, ...behind] = [strip.key, ...strip.behind].map((key) => this.named(key));
-        const more = strip.joined.map(({ key }) => ` with ${this.named(key)}`);
-        const against = strip.against ? ` against ${this.named(strip.against.key)}` : '';
-        return [first, ...behind].join(' over ') + more.join('') + against;
-      }),
+      curves: share.curves.pinned,
       theme: this.appearance.chosen,
       closed: zoom.boxes.filter(({ id }) => zoom.hand.has(id)).map(({ path }) => path),
       shows: share.asMatrix ? 'matrix' : this.appearance.shown.pathways ? 'pathways' : 'network',
@@ -208,26 +212,6 @@ export class Views {
     const from = [left, top];
     const there = at.map((one, axis) => (back ? from[axis] + scale * one : (one - from[axis]) / scale));
     return [zoom, ...there.map((one) => Number(one.toPrecision(6)))];
-  }
-
-  /** How the file calls what is asked for by a key. @param {string} key @returns {string} */
-  named(key) {
-    const [id, what] = key.split('.'),
-      group = this.share.strips.group(id),
-      called = (group && refOf(group.data)) ?? group?.title ?? '';
-    return what ? `${called}.${what}` : called;
-  }
-
-  /** By what is asked for what the file calls so, '' for nothing. @param {string} name @returns {string} */
-  key(name) {
-    const { attention, strips } = this.share,
-      all = [...attention.groups.values(), ...strips.beside.groups.values()];
-    /** @param {string} called */
-    const id = (called) => all.find(({ data, title }) => (refOf(data) ?? title) === called)?.id ?? '';
-    const own = id(name),
-      dot = name.lastIndexOf('.'),
-      other = own || dot < 0 ? '' : id(name.slice(0, dot));
-    return own || (other && `${other}${name.slice(dot)}`);
   }
 
   /** Have a page, and the owner's run, be as a view says; what is of another picture than the one that is shown waits for
@@ -273,35 +257,17 @@ export class Views {
   /** Pin curves and nothing else; what is none any more. What nothing is called may be a measure: the owner's run is asked
    * for it, and they are pinned again when it is one. @param {string[]} curves @param {boolean} [asks] @returns {string[]} */
   pin(curves, asks = true) {
-    const { controls, link, strips } = this.share,
-      all = new Set(curves.flatMap((curve) => curve.split(JOINING).filter((_, at) => at % 2 === 0)));
-    const keys = new Map([...all].map((name) => [name, this.key(name)])),
-      unknown = [...all].filter((name) => !keys.get(name)),
+    const { controls, curves: named, link } = this.share,
+      before = named.strips.pinned,
+      unknown = named.pin(curves),
       asked = asks && controls.owner ? unknown.filter((text) => text.length <= LONGEST) : [];
     this.waiting = asked.length ? { curves, texts: new Set(asked) } : null;
     if (controls.owner) {
       // a measure without a strip could not be taken away
-      for (const { id } of strips.pinned)
-        if (id[0] === 'm' && ![...keys.values()].includes(id)) link.ask('unmeasure', { number: Number(id.slice(1)) });
+      const kept = measuresIn(named.strips.pinned);
+      for (const id of measuresIn(before)) if (!kept.has(id)) link.ask('unmeasure', { number: Number(id.slice(1)) });
     }
     for (const text of asked) link.ask('measure', { text });
-    strips.only(
-      curves.flatMap((curve) => {
-        const [first, ...more] = curve.split(JOINING),
-          /** @type {Object<string, string[]>} */ beside = { over: [], with: [], against: [] };
-        for (let at = 0; at < more.length; at += 2) if (keys.get(more[at + 1])) beside[more[at]].push(more[at + 1]);
-        if (!keys.get(first)) return [];
-        const names = [first, ...beside.over],
-          keyed = (/** @type {string[]} */ some) => some.map((name) => keys.get(name) ?? '');
-        return [
-          {
-            curve: { items: keyed(names), names },
-            joined: keyed(beside.with),
-            against: keyed(beside.against)[0],
-          },
-        ];
-      }),
-    );
     return unknown.filter((name) => !asked.includes(name));
   }
 
