@@ -15,16 +15,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from live_window import area_of
-from test_live_browser import pause, shown
+from test_live_browser import STEP, pause, shown
+from test_live_hand import at_hand
 from test_live_looking import TIP, places, told
 from test_live_server import Eyes, Live, served
 from test_live_zoom import picture
 from test_scene_bundles import LAYERS
 
 import neurovis_spec as nv
+from neurovis_spec.live.commands import Appearance
 from neurovis_spec.live.held import told_of
 from neurovis_spec.live.joined import joined
+from neurovis_spec.live.protocol import values_message
+from neurovis_spec.live.show import Show
+from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.sums import Sums
+from neurovis_spec.live.turns import Lesion
 from neurovis_spec.live.view import View, view_of
 
 #: The second layer in a box; what a picture draws of 90 connections is a part.
@@ -270,5 +276,105 @@ def test_what_is_held_is_drawn_listed_and_counted_with_the_weights_of_now(tmp_pa
             await opened.ask("document.querySelector('#picture').focus()")
             await opened.key("Escape")
             await opened.until(f"{TIP}.hidden")
+
+    asyncio.run(main())
+
+
+#: A network of which a picture with room for four lines leaves out pathways of one connection, and a part of others.
+LONE = """neurovis: 1
+name: lone
+neurons: {A: {count: 2, activation: tanh, bias: 0.1}, B: {activation: tanh}, C: {activation: tanh}, D: {}, E: {}}
+connections:
+  - A -> B: 1
+  - A -> C: 1
+  - A -> D: 1
+  - B -> D: {weight: -0.05, delay: 3}
+  - C -> D: 0.05
+  - C -> E: 1
+  - E -> C: 1
+"""
+
+
+def test_of_what_is_added_up_each_lesioned_connection_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, number in {"_ALL": 1, "_MOST_LINES": 1, "_LINES_EACH": 0}.items():
+        monkeypatch.setattr(f"neurovis_spec.scene.shown.{name}", number)
+    compiled = nv.compile_text(LONE, file="lone.yaml")
+    view, source = Show().view(compiled, Appearance(pathways=True)), SimulatedSource(compiled.simulator())
+    items = ["c0", "c1", "n0", "n99", "c1.g", "e0"]
+    assert (view.partly(source.seen(), items), view.glance(source.seen()).sums[:, -1].sum()) == ({}, 0)
+    source.turn(Lesion("A1 -> C"))
+    assert (view.partly(source.seen(), items), view.glance(source.seen()).sums[:, -1].sum()) == ({"c1": (1, 2)}, 1)
+    source.turn(Lesion("A2 -> C"))
+    assert (view.partly(source.seen(), items), view.glance(source.seen()).sums[:, -1].sum()) == ({}, 2)
+    assert np.flatnonzero(view.lesioned(source.seen())[1]).tolist() == [1]
+    source.turn(Lesion("A1"))
+    assert view.partly(source.seen(), items)["n0"] == (1, 2)
+    message = json.loads(values_message(3, {}, {}, ({"n0": (1, 2)}, {})))
+    assert message == {"type": "values", "step": 3, "values": {}, "other": {}, "lost": {"n0": [1, 2]}, "otherLost": {}}
+
+
+@pytest.mark.browser
+def test_a_bundle_says_what_of_it_is_lesioned_also_if_it_is_one_connection(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, number in {"_ALL": 4, "_MOST_LINES": 4, "_LINES_EACH": 0}.items():
+        monkeypatch.setattr(f"neurovis_spec.scene.shown.{name}", number)
+    (tmp_path / "lone.yaml").write_text(LONE)
+    rows = "[...document.querySelectorAll('#found li')].map((row) => row.textContent)"
+    scrub = "document.querySelector('#scrub')"
+
+    async def main() -> None:
+        async with at_hand(tmp_path, str(tmp_path / "lone.yaml")) as (opened, desk, _):
+            await opened.until(f"{STEP} > 30")
+            await pause(opened)
+            compiled = desk.placed.compiled
+            view = view_of(compiled, compiled.gains)
+            scene, area = json.loads(gzip.decompress(view.content)), area_of(view)
+            assert set(scene["bundles"]["lone"]) == {"bundle:B -> D", "bundle:C -> D"}
+            bundles = {
+                group["id"]: group["shapes"][0] for group in scene["groups"] if group["id"].startswith("bundle:")
+            }
+
+            async def over(bundle: str, *wanted: str) -> str:
+                a, b, c, d = np.reshape(bundles[f"bundle:{bundle}"]["points"][:8], (4, 2))
+                await opened.point(2, 2)
+                await opened.point(*area.at(*(a + 3 * b + 3 * c + d) / 8))
+                said = f"{json.dumps(wanted)}.every((words) => {TIP}.textContent.includes(words))"
+                await opened.until(f"!{TIP}.hidden && {said}")
+                return str(await opened.ask(f"{TIP}.textContent"))
+
+            async def hold(name: str) -> None:
+                await opened.ask(f"Object.assign(document.querySelector('#search'), {{value: '{name}'}}).oninput()")
+                await opened.until(f"{rows}[0]?.startsWith('{name} ')")
+                await opened.ask("document.querySelector('#search').focus()")
+                await opened.key("Enter")
+
+            async def lesion(name: str) -> None:
+                await hold(name)
+                await opened.until("!document.querySelector('#part').hidden")
+                await opened.ask("document.querySelector('#lesion').click()")
+                await opened.until(f"{rows}[0]?.startsWith('{name} ') && {rows}[0].includes('lesioned')")
+
+            assert await over("B -> D", "weight") == "B → D\nweight −0.05\ndelay 3"
+            await opened.ask(f"{scrub}.value = 20; {scrub}.dispatchEvent(new Event('input'))")
+            await opened.until(f"{STEP} == 20")
+            await opened.key("o")
+            await lesion("B → D")
+            await hold("A → C")  # which lists what it stands for
+            await lesion("A1 → C")
+            for _ in range(2):
+                await opened.key("Escape")
+                await opened.ask("document.querySelector('#picture').focus()")
+            words = (await over("B -> D", "weight", "lesioned")).split("\n")
+            assert (words[:3], words[-1]) == (["B → D", "weight −0.05", "delay 3"], "lesioned")
+            assert await over("A -> C", "lesioned") == "A → C · 2 connections, sum 2 (1 lesioned)\nall excite"
+            assert "lesioned" not in await over("C -> D", "weight")
+            (tmp_path / "told.png").write_bytes(await opened.shot())
+            await opened.key("g")  # as pathways: of what is added up a part is lesioned
+            await opened.until("document.querySelector('#pathways').ariaPressed == 'true'")
+            await opened.key("o")
+            await opened.until(f"!{rows}.some((row) => row.startsWith('A1 → C'))")
+            await hold("A → C")
+            await opened.until(f"{rows}[0].includes('1 of 2 lesioned')")
 
     asyncio.run(main())

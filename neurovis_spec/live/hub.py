@@ -363,8 +363,7 @@ class Hub:
             yield from self._aside(client, shown)
         if client.asked:
             client.asked = False
-            beside = {} if shown.compared is None else shown.view.values(shown.compared.seen, client.items)
-            yield values_message(shown.glance.step, _values(shown, client.items), beside)
+            yield _told_values(shown, client.items)
         if client.traces:
             traces, client.traces = client.traces, ()
             yield from traces
@@ -463,6 +462,14 @@ class Hub:
             found = frame_message(shown.glance, shown.reach, self._version, self._serial, changed)
             self._frames[since] = found
         return found
+
+
+def _told_values(shown: Shown, items: tuple[str, ...]) -> str:
+    """What a client is told of what it looks at, of the run and of the branch that is shown beside it."""
+    view, other = shown.view, None if shown.compared is None else shown.compared.seen
+    beside = {} if other is None else view.values(other, items)
+    lost = view.partly(shown.seen, items), {} if other is None else view.partly(other, items)
+    return values_message(shown.glance.step, _values(shown, items), beside, lost)
 
 
 def _values(shown: Shown, items: tuple[str, ...]) -> dict[str, float]:

@@ -242,13 +242,19 @@ def _message(turn: Turn) -> dict[str, object]:
     return {"type": type(turn).__name__.lower(), **asdict(turn)}
 
 
-def values_message(step: int, values: Mapping[str, float], other: Mapping[str, float]) -> str:
-    """Exact values of what a client looks at, and those of the branch beside the run; null for what is no finite
-    number."""
+#: Of how many of what an item stands for so many are lesioned, where these are not all.
+Partly: TypeAlias = Mapping[str, tuple[int, int]]
+
+
+def values_message(
+    step: int, values: Mapping[str, float], other: Mapping[str, float], lost: tuple[Partly, Partly]
+) -> str:
+    """Exact values of what a client looks at, and those of the branch beside the run, null for what is no finite
+    number; and of both what is lesioned in part."""
     known, beside = (
         {name: value if math.isfinite(value) else None for name, value in some.items()} for some in (values, other)
     )
-    return _text("values", step=step, values=known, other=beside)
+    return _text("values", step=step, values=known, other=beside, lost=lost[0], otherLost=lost[1])
 
 
 def trace_message(version: int, traces: Mapping[tuple[int, int], Range], bins: Bins, kind: int = TRACE) -> bytes:

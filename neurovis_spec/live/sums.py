@@ -1,7 +1,7 @@
 """Sums: what the connections of bundles add up to at a step.
 
-In: pathways, weights, how lines end, which connections are lesioned. Out: of each pathway, and of what in it excites,
-inhibits and does neither, the sum of the weights and how many there are; and how many of all are lesioned.
+In: pathways, weights, how lines end, how many connections are lesioned. Out: of each pathway, and of what in it
+excites, inhibits and does neither, the sum of the weights and how many there are; and how many of all are lesioned.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ class Sums:
     def __len__(self) -> int:
         return len(self.starts)
 
-    def at(self, weights: FloatArray, ends: EndArray, lesioned: npt.NDArray[np.bool_]) -> SumArray:
-        """The sums of a step: weights, ends and what is lesioned of all connections (m,)."""
+    def at(self, weights: FloatArray, ends: EndArray, lost: npt.NDArray[np.bool_] | IntArray) -> SumArray:
+        """The sums of a step: weights, ends and how many are lesioned of all connections (m,)."""
         if not len(self.starts):
             return np.zeros((0, NUMBERS), np.float32)
         own, end = weights[self.members], ends[self.members]
         rows = [np.where(end == one, own, 0.0) for one in ENDS]
         rows += [np.where(end == one, self.counts, 0) for one in ENDS]
-        rows.append(np.where(lesioned[self.members], self.counts, 0))
+        rows.append(lost[self.members])
         with np.errstate(over="ignore", invalid="ignore"):
             result: SumArray = np.add.reduceat(np.stack(rows), self.starts, axis=1).T.astype(np.float32)
         return result

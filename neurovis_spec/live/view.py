@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
@@ -124,7 +124,8 @@ class View:
         ends = drawn.ends(whole.weights, whole.ends)
         shown = looks(drawn.network, snapshot, self.gains, self.plan.frame.widest, drawn.signals(whole), ends)
         words = self.plan.caption_shape(caption(drawn.whole, whole.step, whole.activity))
-        neurons, lines = self.lesioned(seen)
+        lost_neurons, lost = self._lost(seen)
+        neurons, lines = lost_neurons == self.drawn.sizes, lost == self.drawn.counts
         headless = ends <= 0  # a bar, or nothing, which is a bar of what is not negative
         of_lines = headless * BAR + lines * FAINT + (ends < 0) * NEGATIVE + self._shares(snapshot.weights) * _SHARE
         clamped, undefined = self._all(seen.clamped), ~np.isfinite(snapshot.told)
@@ -139,14 +140,14 @@ class View:
             kinds=np.concatenate([of_lines, of_neurons]).astype(np.uint8),
             pose=_short(whole.pose),
             told=_short(whole.commands),
-            sums=self.sums.at(snapshot.weights, ends, lines),
+            sums=self.sums.at(snapshot.weights, ends, lost),
         )
 
     def added(self, seen: Seen, sums: Sums) -> SumArray:
         """What some connections add up to at a step."""
         weights = self.drawn.snapshot(seen.snapshot).weights
         ends = self.drawn.ends(seen.snapshot.weights, seen.snapshot.ends)
-        return sums.at(weights, ends, self.lesioned(seen)[1])
+        return sums.at(weights, ends, self._lost(seen)[1])
 
     def _shares(self, weights: FloatArray) -> npt.NDArray[np.int64]:
         """How large weights are, as parts of the largest of their scale; none is 0 that is not."""
@@ -232,12 +233,34 @@ class View:
 
     def lesioned(self, seen: Seen) -> tuple[Mask, Mask]:
         """Which glyphs and lines are drawn as lesioned: those of which all neurons, or all connections, are."""
+        neurons, lines = self._lost(seen)
+        return neurons == self.drawn.sizes, lines == self.drawn.counts
+
+    def partly(self, seen: Seen, items: Iterable[str]) -> dict[str, tuple[int, int]]:
+        """Of which glyphs and lines, by these ids, some are lesioned and others not: how many, and of how many."""
+        if not self.drawn.any:
+            return {}
+        neurons, lines = self._lost(seen)
+        kinds = {"n": (neurons, self.drawn.sizes), "c": (lines, self.drawn.counts)}
+        result = dict[str, tuple[int, int]]()
+        for item in items:
+            if item[0] in kinds and item[1:].isdigit():
+                lost, whole = kinds[item[0]]
+                index = int(item[1:])
+                if index < len(whole) and 0 < lost[index] < whole[index]:
+                    result[item] = int(lost[index]), int(whole[index])
+        return result
+
+    def _lost(self, seen: Seen) -> tuple[Mask | IntArray, Mask | IntArray]:
+        """How many neurons of each glyph, and connections of each line, are lesioned."""
         drawn = self.drawn
         if not drawn.any:
             return seen.lesioned_neurons, seen.lesioned_connections
         outside = drawn.bundle >= 0
-        gone = np.bincount(drawn.bundle[outside], seen.lesioned_connections[outside], len(drawn.counts))
-        return self._all(seen.lesioned_neurons), gone == drawn.counts
+        return (
+            np.bincount(drawn.unit, seen.lesioned_neurons, len(drawn.sizes)).astype(np.int64),
+            np.bincount(drawn.bundle[outside], seen.lesioned_connections[outside], len(drawn.counts)).astype(np.int64),
+        )
 
     @property
     def radius(self) -> float:

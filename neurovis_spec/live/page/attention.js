@@ -2,7 +2,7 @@
  * Attention: what is pointed at, and what is held; its values, and what stands out with it.
  */
 
-import { Bands } from './bands.js';
+import { Bands, count, restOf } from './bands.js';
 import { isBeside } from './beside.js';
 import { halfway } from './marks.js';
 import { say } from './say.js';
@@ -47,13 +47,11 @@ export function along(points) {
   return found;
 }
 
-/** In which of two branches something is so, in words; nothing where it is in neither. @param {string} words @param {number} bit
- * @param {number[]} kinds of the run, and of the branch beside it @param {Look | null} other that branch, if there is one
- * @returns {string[]} */
-function where(words, bit, kinds, other) {
-  const [inA, inB] = kinds.map((kind) => (kind & bit) !== 0);
-  if (!inA && !inB) return [];
-  return [other && inA !== inB ? `${words} in ${inA ? 'A' : 'B'}` : words];
+/** What is so, and in which of two branches; nothing where it is in neither. @param {string[]} words of the run, and of the
+ * branch beside it, '' where it is not so @param {Look | null} other that branch, if there is one @returns {string[]} */
+function where([inA, inB], other) {
+  const each = !other || inA === inB ? [inA] : [inA && `${inA} in A`, inB && `${inB} in B`];
+  return each.filter(Boolean);
 }
 
 /** What is pointed at and what is held, by the ids of their groups, '' for nothing. */
@@ -93,6 +91,9 @@ export class Attention {
     this.values = {};
     /** those of the branch beside the run @type {Object<string, number | null>} */
     this.other = {};
+    /** of what is lesioned in part how many of how many are, in the run and in the branch beside it
+     * @type {Object<string, number[]>[]} */
+    this.lost = [{}, {}];
     /** where the picture of the run stands; and that which is pointed at, where it is another */
     this.stands = new Sized(/** @type {HTMLElement} */ (document.getElementById('picture')), changed);
     /** @type {Sized | null} */
@@ -223,9 +224,11 @@ export class Attention {
     return [id, ...joined, ...[...lines, ...dotted, ...discs].map((group) => (group ? group.id : ''))];
   }
 
-  /** @param {{values: Object<string, number | null>, other: Object<string, number | null>}} message */
+  /** @param {{values: Object<string, number | null>, other: Object<string, number | null>,
+   *   lost: Object<string, number[]>, otherLost: Object<string, number[]>}} message */
   take(message) {
     [this.values, this.other] = [message.values, message.other];
+    this.lost = [message.lost, message.otherLost];
     this.speak();
     this.changed();
   }
@@ -248,7 +251,6 @@ export class Attention {
   counts(id) {
     if (!this.all || this.all.of !== id) return [];
     const { inputs, outputs, within, undrawn } = this.all,
-      count = (/** @type {number} */ number) => number.toLocaleString('en'),
       among = id[0] === 'n' ? 'to itself' : 'within',
       all = inputs + outputs + within;
     return [
@@ -278,24 +280,31 @@ export class Attention {
       beside = id in this.other ? `, in B ${signed(this.other[id])}` : '',
       told = id in this.values ? [`${what} ${signed(this.values[id])}${beside}`] : [];
     if (delay !== undefined && !more.some((line) => line.startsWith('delay '))) told.push(`delay ${delay}`);
-    const item = Number(id.slice(1)) + (neuron === undefined ? 0 : look.widths.length);
-    const { isClamped = 0, isFaint = 0 } = this.link.scene?.constants ?? {},
-      kinds = [look, other].map((one) => one?.kinds[item] ?? 0);
-    return [
-      name,
-      ...told,
-      ...more,
-      ...(neuron === undefined ? [] : where('clamped', isClamped, kinds, other)),
-      ...where('lesioned', isFaint, kinds, other),
-    ].join('\n');
+    return [name, ...told, ...more, ...this.states(id, look, other)].join('\n');
   }
 
-  /** What is known of a connection that the picture leaves out. @param {string} id @returns {Group | null} */
+  /** Whether a neuron is clamped, and whether it or a connection is lesioned, or so many of those that it stands for.
+   * @param {string} id @param {Look} look @param {Look | null} other of the branch beside it @returns {string[]} */
+  states(id, look, other) {
+    const isNeuron = id[0] === 'n',
+      place = Number(id.slice(1)) + (isNeuron ? look.widths.length : 0),
+      { isClamped = 0, isFaint = 0 } = this.link.scene?.constants ?? {},
+      kinds = [look, other].map((one) => one?.kinds[place] ?? 0);
+    const clamped = kinds.map((kind) => (isNeuron && kind & isClamped ? 'clamped' : '')),
+      lesioned = kinds.map((kind, at) => {
+        const part = this.lost[at][id];
+        return kind & isFaint ? 'lesioned' : part ? `${count(part[0])} of ${count(part[1])} lesioned` : '';
+      });
+    return [...where(clamped, other), ...where(lesioned, other)];
+  }
+
+  /** What is known of a connection that the picture leaves out, or draws as a bundle. @param {string} id @returns {Group | null} */
   unseen(id) {
     const { scene } = this.link;
     if (!scene || !this.isKnown(id)) return null;
     const [from, to] = scene.ends.map((ends) => this.groups.get(`n${ends[Number(id.slice(1))]}`)?.data.neuron ?? '');
-    return { id, data: { from, to }, title: `${from} → ${to}`, shapes: [] };
+    const more = restOf(this.others.get(this.bands?.bundleOf(id) ?? ''));
+    return { id, data: { from, to }, title: [`${from} → ${to}`, ...more].join('\n'), shapes: [] };
   }
 
   /** Where a neuron is, the tip of a connection, the middle of a bundle, the corner of a box. @param {string} id

@@ -43,6 +43,10 @@ function beside(points, by) {
   return points.map((value, at) => value + (at % 2 ? (by * dx) / far : (-by * dy) / far));
 }
 
+/** What else the title of a bundle says: rules and delays. @param {Group} [bundle] @returns {string[]} */
+export const restOf = (bundle) =>
+  (bundle?.title ?? '').split('\n').filter((line, at) => at && !/^[\d,]+ (excite|inhibit|neither|of them)/.test(line));
+
 /** The bundles of a scene. */
 export class Bands {
   /** @param {Scene} scene */
@@ -54,6 +58,13 @@ export class Bands {
     this.added = [];
     this.most = 0;
     this.number = new Map(bundles.joined.map((id, number) => [id, number]));
+  }
+
+  /** The id of the bundle that a connection is drawn as, of which it is the only one; '' for none. @param {string} id
+   * @returns {string} */
+  bundleOf(id) {
+    const { lone } = this.bundles;
+    return Object.keys(lone).find((bundle) => `c${lone[bundle]}` === id) ?? '';
   }
 
   /** What a bundle is drawn of: each band with its line and its head. A band that is not there at first stands beside that
@@ -146,20 +157,19 @@ export class Bands {
     };
   }
 
-  /** What is said of a bundle that stands for several connections. @param {Group} group @param {Look} look
+  /** What is said of a bundle that stands for several connections. @param {Group} bundle @param {Look} look
    * @param {Look | null} other of the branch beside it @returns {string} */
-  words({ id, title, data }, look, other) {
+  words(bundle, look, other) {
+    const { id, title, data } = bundle;
     const [told, beside] = [look, other].map((one) => one && this.told(id, one));
     if (!told) return title;
     const { many, sum, parts } = this.summed(told),
       inB = beside && this.summed(beside);
-    // what else its title says: rules and delays
-    const more = title.split('\n').filter((line, at) => at && !/^[\d,]+ (excite|inhibit|neither|of them)/.test(line));
     return [
-      `${data.pathway.replace('->', '→')} · ${count(many)} connections, ${sum}`,
+      `${data.pathway.replace('->', '→')} · ${count(many)} connection${many === 1 ? '' : 's'}, ${sum}`,
       ...parts,
       ...(inB ? [`in B ${[inB.sum, ...inB.parts].join('; ')}`] : []),
-      ...more,
+      ...restOf(bundle),
     ]
       .filter(Boolean)
       .join('\n');

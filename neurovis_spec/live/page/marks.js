@@ -38,9 +38,10 @@ export class Marks {
     this.marks = scene.groups.flatMap((group) => {
       const { id, data } = group;
       if (data.neuron !== undefined) return [{ group, item: items.get(data.neuron) ?? 0, ends: [] }];
-      if (data.connection === undefined) return [];
-      const ends = [data.from, data.to].flatMap((name) => items.get(name) ?? []);
-      return [{ group, item: Number(id.slice(1)), ends }];
+      const single = scene.bundles.lone[id];
+      if (data.connection === undefined && single === undefined) return [];
+      const ends = (data.pathway?.split(' -> ') ?? [data.from, data.to]).flatMap((name) => items.get(name) ?? []);
+      return [{ group, item: single ?? Number(id.slice(1)), ends }];
     });
   }
 

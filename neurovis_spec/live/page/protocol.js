@@ -59,7 +59,7 @@ import { isStill } from './camera.js';
  * @typedef {{type: 'undefined', item: string, since: number, known: boolean, count: number}} Nonfinite */
 /** Where a page stood; null of what it says nothing. @typedef {{step: number | null, speed: string | null, camera: number[] | 'whole' | null, curves: string[] | null,
  *   theme: string | null, closed: string[] | null, shows: string | null, window: string | null}} SavedView */
-/** @typedef {Status | {type: 'views', file: string, views: Object<string, SavedView>, findings: string} | {type: 'values', step: number, values: Object<string, number | null>, other: Object<string, number | null>}
+/** @typedef {Status | {type: 'views', file: string, views: Object<string, SavedView>, findings: string} | {type: 'values', step: number, values: Object<string, number | null>, other: Object<string, number | null>, lost: Object<string, number[]>, otherLost: Object<string, number[]>}
  *   | {type: 'body', skeleton: Skeleton | null, start: number[], motors: Motor[]}
  *   | {type: 'fitting', window: string | null, shown: string}
  *   | {type: 'making', done: number, total: number}
