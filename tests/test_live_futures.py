@@ -289,6 +289,23 @@ def test_they_are_bounded_and_the_oldest_go_first(monkeypatch: pytest.MonkeyPatc
     assert [one.number for one in small.all] == [4]
 
 
+def test_they_are_bounded_where_a_larger_one_is_left_to_go_to_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = at(400)
+    source.go(10)
+    source.turn(Set({"pull": 0.3}))
+    (large,) = source.futures.all
+    source.switch(large.number)
+    (small,) = source.futures.all
+    assert (source.reach.last, source.futures.dropped) == (400, 0)
+    monkeypatch.setattr(kept, "ROOM", large.size - 1)
+    source.switch(small.number)
+    assert (source.reach.last, source.futures.all, source.futures.dropped) == (10, (), 1)
+    with pytest.raises(SourceError, match="no longer kept"):
+        source.switch(large.number)
+    run = Run(source, view_of(COMPILED, COMPILED.gains), lambda shown: None, lambda: False)
+    assert json.loads(status_message(run.shown().status, True))["dropped"] == 1, "which a page tells"
+
+
 def test_futures_are_named_deleted_with_those_within_and_had_again() -> None:
     source = at(30)
     source.go(10)

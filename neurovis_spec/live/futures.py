@@ -97,8 +97,9 @@ class Futures:
         ]
         return max(found, key=attrgetter("place"), default=None)
 
-    def bounded(self, room: int = ROOM) -> Futures:
-        """Without the oldest, where they are too many or take too much room."""
+    def bounded(self, room: int | None = None) -> Futures:
+        """Without the oldest, where they are too many or take too much room, by default that of ROOM."""
+        room = ROOM if room is None else room
         spare = 0 if self.deleted is None else self.deleted[0].size
         kept = _bounded(self.all, room)
         fewer = len(_every(self.all)) - len(_every(kept))

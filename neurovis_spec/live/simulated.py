@@ -290,8 +290,8 @@ class SimulatedSource:
         return self.futures.leave(left)
 
     def switch(self, number: int, step: int | None = None) -> None:
-        """Go to another future, to a step, by default that which is shown, or to its last. Raises SourceError, also
-        where the body cannot do again what it has done."""
+        """Go to another future, to a step, by default that which is shown, or to its last; of what is too much then the
+        oldest are forgotten. Raises SourceError, also where the body cannot do again what it has done."""
         path = self.futures.path(number)
         step = self.step if step is None else step
         if not path:
@@ -303,6 +303,7 @@ class SimulatedSource:
             self._past, self.history = self._past.copy(), self.history.copy()
             for future in path:
                 self._take_up(future, step)
+            self.futures = self.futures.bounded()
 
     def twin(self, number: int) -> SimulatedSource:
         """Another run of the same network, which is in a future, by its number, at the step that is shown or at its
