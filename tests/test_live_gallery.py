@@ -11,6 +11,7 @@ import aiohttp
 import pytest
 from chromium import chromium
 from click.testing import CliRunner
+from test_live_browser import STEP
 from test_live_server import Eyes
 
 from neurovis_spec import user_cache
@@ -30,6 +31,13 @@ name: NAME
 time: {dt: 0.01}
 neurons: {A: {bias: 0.4}, B: {activation: tanh}}
 connections: {A -> B: 1, B -> A: -1}
+"""
+#: A fan that is wide as it is laid out anywhere, and can be high.
+FAN = """neurovis: 1
+name: fan
+time: {dt: 0.01}
+neurons: {A: {activation: tanh, bias: 0.1}, N: {count: 12, activation: tanh}}
+connections: {A -> N: 1}
 """
 INCLUDED = "neurovis: 1\nmodules: {m: {neurons: {A: {}}}}\n"
 
@@ -194,3 +202,61 @@ def test_two_clicks_open_a_network_that_runs(folder: Path, tmp_path: Path) -> No
             assert opened.errors == []
 
     asyncio.run(main())
+
+
+def test_the_network_of_a_room_is_laid_out_for_the_window_of_its_owner_and_of_no_other(folder: Path) -> None:
+    (folder / "fan.yaml").write_text(FAN)
+    names = [one.name for one in specs_in(folder)]
+    fan, one = names.index("fan.yaml"), names.index("one.yaml")
+
+    async def main() -> None:
+        async with served(folder) as (access, session):
+            owner, viewer = f"token={access.owner}", f"token={access.viewer}"
+            eyes = Eyes(await session.ws_connect(f"/live?{owner}&spec={fan}"))
+            beside = Eyes(await session.ws_connect(f"/live?{owner}&spec={one}"))
+            await eyes.until(lambda: eyes.step > 3)
+            await beside.until(lambda: beside.step > 3)
+            assert eyes.scene["window"] == beside.scene["window"] == "default"
+            late = Eyes(await session.ws_connect(f"/live?{viewer}&spec={fan}"))
+            await late.until(lambda: late.step > 3)
+            await late.ask("fit", window="tall")
+            await late.until(lambda: late.told[-1]["type"] == "refused")
+            await eyes.ask("fit", window="tall")
+            await eyes.until(lambda: eyes.scene["window"] == "tall")
+            await late.until(lambda: late.scene["window"] == "tall")
+            step = eyes.step
+            await eyes.until(lambda: eyes.step > step)
+            await eyes.until(lambda: any(told["type"] == "fitting" and told["window"] is None for told in eyes.told))
+            assert beside.scene["window"] == "default"
+
+    asyncio.run(main())
+
+
+@pytest.mark.browser
+def test_a_click_on_a_telephone_opens_a_network_that_is_laid_out_for_that(folder: Path, tmp_path: Path) -> None:
+    (folder / "fan.yaml").write_text(FAN)
+    number = [one.name for one in specs_in(folder)].index("fan.yaml")
+
+    async def main() -> None:
+        async with served(folder) as (access, session), chromium(tmp_path) as opened:
+            await opened.size(390, 844)
+            await opened.call("Page.navigate", url=access.url())
+            await opened.until("document.querySelectorAll('a').length > 2")
+            await opened.ask(f"document.querySelector('[data-spec=\"{number}\"]').click()")
+            await opened.until("+document.querySelector('#scrub')?.value > 3", 60)
+            eyes = Eyes(await session.ws_connect(f"/live?token={access.viewer}&spec={number}"))
+            await eyes.until(lambda: eyes.scene.get("window") == "tall")
+            step = eyes.step
+            await eyes.until(lambda: eyes.step > step)
+            await opened.until(f"{STEP} > {eyes.step}")  # so that it has the same by now
+            await opened.ask("document.querySelector('#picture').focus()")
+            await opened.key("+")
+            await opened.until("location.hash.includes('view=') && location.hash.includes('window=tall')")
+            await opened.key("0")
+            await opened.until("!location.hash.includes('view=')")
+            (tmp_path / "room.png").write_bytes(await opened.shot())
+            await opened.size(1280, 800)
+            await eyes.until(lambda: eyes.scene["window"] == "default")
+            assert opened.errors == []
+
+    asyncio.run(asyncio.wait_for(main(), 240))

@@ -380,18 +380,29 @@ def test_a_saved_view_has_the_window_of_its_camera(tmp_path: Path) -> None:
 @asynccontextmanager
 async def opened(folder: Path, text: str) -> AsyncIterator[tuple[Page, Access, Run]]:
     """A browser, and a live view that knows files, at which nobody looks yet."""
-    network, show, hub = compiled(text), Show(), Hub(asyncio.get_running_loop(), REQUESTS)
+    async with editable(folder, text) as (page, access, run, _):
+        yield page, access, run
+
+
+@asynccontextmanager
+async def editable(folder: Path, text: str) -> AsyncIterator[tuple[Page, Access, Run, Edits]]:
+    """The same, with what shows its spec, x.yaml, anew when that was edited."""
+    path = folder / "x.yaml"
+    path.write_text(text)
+    network, show, hub = nv.compile(path), Show(), Hub(asyncio.get_running_loop(), REQUESTS)
     run = Run(*show.stage(network), hub.show, lambda: hub.watched)
     sock = listen("127.0.0.1", 0)
     access = Access("127.0.0.1", sock.getsockname()[1], viewers=True)
-    desk = Desk(network, None, show.view, run, hub.keep_soon)
+    written = Written(path, lambda again: compiled(again, folder))
+    desk = Desk(network, None, show.view, run, hub.keep_soon, written)
+    edits = Edits(show, Edited(path, lambda: nv.compile(path)), run, hub.keep_soon, desk)
     server = Server(access, hub, run, desk)
     await server.start(sock)
     run.start()
     desk.start()
     try:
         async with chromium(folder) as page:
-            yield page, access, run
+            yield page, access, run, edits
             assert page.errors == []
     finally:
         desk.end()
@@ -538,5 +549,136 @@ def test_a_link_shows_a_part_of_the_picture_in_the_layout_that_it_was_in(tmp_pat
                 await asyncio.sleep(0.1)
             wanted = link.partition("#")[2].partition("view=")[2].partition("&")[0]
             await page.until(f"location.hash.includes('view={wanted}') && location.hash.includes('window=tall')")
+
+    asyncio.run(asyncio.wait_for(main(), 240))
+
+
+#: A fan in a box, and how a page is told of it.
+BOXED = FAN.replace("count: 12,", "count: 12, box: fan,")
+BOX = "box:fan"
+#: Whether the matrix is shown, of a network with a title.
+MATRIX = (
+    "document.querySelector('#matrix').ariaPressed == 'true' && picture.ariaLabel == '{}, the matrix of its weights'"
+)
+
+
+async def until_window(run: Run, window: str) -> None:
+    """Wait until the network is laid out for a window."""
+    while told(run.view) != window:
+        await asyncio.sleep(0.05)
+
+
+@pytest.mark.browser
+def test_closed_boxes_and_the_matrix_stay_in_another_layout(tmp_path: Path) -> None:
+    """Where the window is turned, and where the layout, or the network, was edited."""
+    closing = "JSON.parse(asked.filter((one) => one.includes('\"close\"')).pop() ?? '{}').boxes?.join()"
+
+    async def main() -> None:
+        async with editable(tmp_path, BOXED) as (page, access, run, edits):
+
+            async def edit(text: str) -> None:
+                before = run.view
+                (tmp_path / "x.yaml").write_text(text)
+                await asyncio.to_thread(edits._edited)
+                assert run.view is not before
+
+            async def is_closed(window: str) -> None:
+                await page.until(f"{closing} == '{BOX}'")
+                await page.ask("new Promise((done) => setTimeout(done, 300))")
+                assert (told(run.view), await page.ask(closing)) == (window, BOX)
+
+            await page.size(390, 844)
+            await page.call("Page.addScriptToEvaluateOnNewDocument", source=SOCKETS)
+            await page.call("Page.navigate", url=access.url())
+            await until_window(run, "tall")
+            await page.until(f"{STEP} > 3")
+            await page.ask("document.querySelector('#picture').focus()")
+            await page.key("o")
+            await page.ask("Object.assign(document.querySelector('#search'), {value: 'fan'}).oninput()")
+            await page.until("document.querySelector('#found li')?.textContent.startsWith('fan')")
+            await page.key("Enter")
+            await page.key("Escape")
+            await page.ask("document.querySelector('#picture').focus()")
+            await page.key("Enter")
+            await is_closed("tall")
+            (tmp_path / "closed_tall.png").write_bytes(await page.shot())
+            await page.ask("asked.length = 0")
+            await page.size(1280, 800)
+            await until_window(run, "default")
+            await is_closed("default")
+            (tmp_path / "closed_default.png").write_bytes(await page.shot())
+            for text in (BOXED + DIRECTED, BOXED.replace("count: 12", "count: 14")):
+                await page.ask("asked.length = 0")
+                await edit(text)
+                await is_closed("default")
+
+            await page.key("m")
+            await page.until(MATRIX.format("A fan"))
+            await page.size(390, 844)
+            await until_window(run, "tall")
+            await page.ask("new Promise((done) => setTimeout(done, 500))")
+            assert await page.ask(MATRIX.format("A fan"))
+            await edit(BOXED.replace("A fan", "Another") + DIRECTED)
+            await page.until(MATRIX.format("Another"))
+            await page.ask("asked.length = 0")
+            await page.key("m")
+            await page.until("picture.ariaLabel == 'Another'")
+            await is_closed("default")
+
+    asyncio.run(asyncio.wait_for(main(), 240))
+
+
+@pytest.mark.browser
+def test_a_saved_view_is_seen_in_the_layout_that_it_was_saved_in(tmp_path: Path) -> None:
+    view = "new URLSearchParams(location.hash.slice(1)).get('view')?.split(' ').map(Number)"
+
+    async def main() -> None:
+        async with opened(tmp_path, FAN) as (page, access, run):
+            await page.size(390, 844)
+            await page.call("Page.navigate", url=access.url())
+            await until_window(run, "tall")
+            await shows(page, run.view)
+            await page.ask("document.querySelector('#picture').focus()")
+            for key in "++l":
+                await page.key(key)
+            await page.until("location.hash.includes('view=') && location.hash.includes('window=tall')")
+            await page.ask("new Promise((done) => setTimeout(done, 600))")
+            wanted = await page.ask(view)
+            assert isinstance(wanted, list)
+            await page.ask("document.querySelector('#viewname').value = 'near'")
+            await page.ask("document.querySelector('#keep').requestSubmit()")
+            await page.until("document.querySelector('#views .go')?.textContent == 'near'")
+            findings = Findings()
+            saved = views_in(tmp_path / "x.neurovis-view.yaml", compiled().network, findings)["near"]
+            assert saved.window == "tall"
+            assert not findings.sorted()
+
+            seen = f"location.hash.includes('window=tall') && {view}?.every("
+            seen += f"(one, at) => Math.abs(one - {wanted}[at]) < 0.01 * {wanted}[at])"
+            for begun in ("", "#saved=near"):
+                await page.call("Page.navigate", url="about:blank")
+                await page.size(1280, 800)
+                await page.call("Page.navigate", url=access.url() + begun)
+                if not begun:
+                    await until_window(run, "default")
+                    await page.until("document.querySelector('#views .go')?.textContent == 'near'")
+                    await page.ask("new Promise((done) => setTimeout(done, 300))")
+                    await page.ask("document.querySelector('#views .go').click()")
+                await until_window(run, "tall")
+                await page.until(seen)
+                if not begun:
+                    (tmp_path / "near.png").write_bytes(await page.shot())
+                    await page.ask("document.querySelector('#undo').click()")
+                    await until_window(run, "tall")
+                    await page.until("!location.hash.includes('view=')")
+
+            await page.call("Page.navigate", url="about:blank")
+            await page.call("Page.navigate", url=access.url())
+            await until_window(run, "default")
+            await page.call("Page.navigate", url="about:blank")
+            await page.call("Page.navigate", url=access.url(owner=False) + "#saved=near")
+            await page.until(f"{STEP} > 3")
+            await page.ask("new Promise((done) => setTimeout(done, 500))")
+            assert told(run.view) == "default", "who only looks on asks for nothing"
 
     asyncio.run(asyncio.wait_for(main(), 240))
