@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import gzip
 import json
+from queue import SimpleQueue
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.live.commands import Measure, Unmeasure
 from neurovis_spec.live.curves import series_of
 from neurovis_spec.live.history import Bins, History, Members
+from neurovis_spec.live.hub import Client, Hub, Reception
 from neurovis_spec.live.protocol import ProtocolError, command_of, measured_message
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.run import Run
@@ -150,6 +153,32 @@ def test_a_run_has_as_many_measures_as_there_is_room_for_and_tells_all() -> None
     source = SimulatedSource(other.simulator())
     run._carry_out(lambda _: (source, view_of(other, other.gains)), lambda why: None)
     assert run.shown().status.measures == (), "there is no B any more"
+
+
+def test_a_measure_that_is_asked_for_before_there_is_a_picture_is_looked_at_like_any_other() -> None:
+    async def main() -> None:
+        view, hub = view_of(COMPILED, COMPILED.gains), Hub(asyncio.get_running_loop())
+        run = Run(SimulatedSource(COMPILED.simulator()), view, hub.show, lambda: True, playing=False)
+        reception, client = Reception(hub, run), Client(owner=True)
+        hub.join(client)
+        for text in ("mean(hiden)", "mean(A)"):
+            reception.take(client, json.dumps({"type": "measure", "text": text}))
+        answers = [json.loads(text) for text in client.texts]
+        assert [(one["type"], one["text"], len(one["findings"])) for one in answers] == [
+            ("measured", "mean(hiden)", 1),
+            ("measured", "mean(A)", 0),
+        ]
+        asked: SimpleQueue[str] = SimpleQueue()
+        run.start()
+        try:
+            run.ask(Measure("C"), asked.put)  # as of a spec that was edited meanwhile
+            assert "C" in await asyncio.to_thread(asked.get, timeout=30)
+        finally:
+            run.end()
+        assert run.shown().status.measures == ((0, "mean(A)"),)
+        assert run.failure is None
+
+    asyncio.run(main())
 
 
 def test_a_recording_that_does_not_hold_what_a_measure_reads_refuses_it() -> None:

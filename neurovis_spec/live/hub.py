@@ -158,11 +158,6 @@ class Hub:
         return len(self._clients)
 
     @property
-    def shown(self) -> Shown | None:
-        """What was shown last."""
-        return self._shown
-
-    @property
     def watched(self) -> bool:
         """Whether anybody looks on."""
         return bool(self._clients)
@@ -510,7 +505,6 @@ class Reception:
             self._hub.drawn(client, acknowledged(message).serial)
             return
         command = command_of(message)
-        shown = self._hub.shown
         if isinstance(command, LookAt):
             self._hub.check(client, command.items)
         elif isinstance(command, Trace):
@@ -523,8 +517,8 @@ class Reception:
             self._hub.dress(client, command)
         elif not client.owner:
             client.tell(refused_message("this page only looks on"))
-        elif isinstance(command, Measure) and shown is not None:
-            found = findings(command.text, shown.view.drawn.whole)
+        elif isinstance(command, Measure):
+            found = findings(command.text, self._run.view.drawn.whole)
             client.tell(measured_message(command.text, found))
             if not found:
                 self._run.ask(command, lambda reason: self._hub.refuse(client, reason))

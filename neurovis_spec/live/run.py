@@ -313,9 +313,9 @@ class Run:
             case Unloop():
                 self._loop = None
             case Measure():
-                self._measure(self._typed.add(asked.text, source.network))
+                self._measure(lambda typed: typed.add(asked.text, source.network))
             case Unmeasure():
-                self._measure(self._typed.without(asked.number))
+                self._measure(lambda typed: typed.without(asked.number))
             case _ if callable(asked):
                 self._show_instead(asked, refuse)
             case _:
@@ -384,10 +384,12 @@ class Run:
             self._ended = False
         return self._loop is not None
 
-    def _measure(self, typed: Typed) -> None:
-        """Have these measures followed. Raises SourceError where a recording does not tell what one reads."""
-        before, self._typed = self._typed, typed
+    def _measure(self, change: Callable[[Typed], Typed]) -> None:
+        """Have other measures followed. Raises SourceError for what is none, as of a spec that was edited since, and
+        where a recording does not tell what one reads."""
+        before = self._typed
         try:
+            self._typed = change(before)
             self._source.history.follow(self._followed())
         except (SpecError, BodyError, RecordingError) as error:
             self._typed = before
