@@ -107,6 +107,10 @@ async def looked_at(opened: Page, spec: str, folder: Path) -> None:
         assert past[0] >= picture[2] if is_beside else past[1] >= picture[3]
         assert strip[2] - strip[0] >= (200 if is_beside else 900)
         assert await opened.ask("past.scrollHeight <= past.clientHeight + 4"), "no strip has to be scrolled to"
+        cursor, hint = await box(opened, "#cursor"), await box(opened, "#strips .label:nth-last-child(3)")
+        assert cursor[3] <= hint[1] + 1, "the line of now runs through no words"
+        overlaps = "[...document.querySelectorAll('.scale')].some(one => one.scrollWidth > one.clientWidth + 1)"
+        assert not await opened.ask(overlaps), "a number leaves its button where it is"
         legend = await box(opened, "#legend")
         assert await opened.ask("document.querySelector('#legend').open") == is_beside
         assert legend[0] >= picture[2] or legend[3] <= picture[1] + 1, "it lies on nothing"
