@@ -123,6 +123,8 @@ def test_a_slash_searches_by_name_and_enter_holds(tmp_path: Path) -> None:
             assert isinstance(names, list)
             assert "K2 → O" in names
             assert all("k2" in name.lower() for name in names)
+            heights = f"{ROWS}.slice(1).map((row) => row.offsetHeight)"
+            assert await opened.ask(f"new Set({heights}).size") == 1, "a line each, whatever the digits"
             await opened.key("ArrowDown")
             await opened.until(f"!{CHOSEN}.startsWith('K2 activity')")
             await opened.key("ArrowUp")

@@ -459,6 +459,7 @@ def test_the_page_offers_what_is_taken_and_nothing_else(tmp_path: Path) -> None:
             buttons = "[...document.querySelectorAll('{0} button:not(.shut)')].filter((one) => one.checkVisibility())"
             words = f"{buttons}.map((one) => one.textContent.trim())"
             assert await opened.ask(words.format("#turning")) == ["copy as events"]
+            assert await opened.ask("events.hidden && copy.disabled"), "there is nothing to copy yet"
             await opened.ask("document.querySelector('#save').click()")
             assert await opened.ask(words.format("#saves")) == ["PNG", "copy picture", "copy link", "present"]
 

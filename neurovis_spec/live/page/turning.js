@@ -89,6 +89,8 @@ export class Turning {
     this.sliders.show(status.parameters);
     this.feeds.show(status.fed);
     this.rules.show(status.learning);
+    this.find('events').hidden = !status.copied;
+    /** @type {HTMLButtonElement} */ (this.find('copy')).disabled = !status.copied;
     this.list(status.turned, status.appearance);
     /** @type {HTMLTextAreaElement} */ (this.find('events')).value = status.copied;
   }
@@ -119,7 +121,8 @@ export class Turning {
       ),
     ];
     list.replaceChildren(...rows.reverse());
-    if (focused) (list.querySelector('button') || this.find('copy')).focus();
+    const summary = /** @type {HTMLElement} */ (this.panel.querySelector('[data-fold=interventions] > summary'));
+    if (focused) (list.querySelector('button') ?? summary).focus();
   }
 
   /** Copy what was turned, as events; where the page may not, select it. */
