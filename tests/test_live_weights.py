@@ -11,6 +11,7 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError
 from neurovis_spec.live.turns import Set, Turn, Turned, Weigh, taken
+from neurovis_spec.live.view import view_of
 from neurovis_spec.live.weights import NO_RANGE, ranges_of
 from neurovis_spec.runtime import signals
 from neurovis_spec.runtime.errors import RecordingError, UnknownNameError
@@ -120,3 +121,17 @@ def test_a_slider_goes_within_the_bounds_of_a_weight_or_as_far_as_the_largest_of
     assert isinstance(lines, list)
     assert NO_RANGE in lines
     assert isinstance(collapsed, CompiledNetwork)
+
+
+def test_a_cell_of_the_matrix_shows_a_weight_though_what_is_learned_has_no_bound() -> None:
+    made = compiled("""
+neurons: {A: {bias: 0.4}, B: {}, C: {}}
+connections:
+  A -> B: {weight: 1}
+  A -> C: {weight: -0.3, plasticity: {hebbian: {rate: 0.01}}}
+render: {gain: {activity: 1, signal: 1, thickness: 2.5, change: 1}}
+""")
+    view, source = view_of(made, made.gains), SimulatedSource(made.simulator())
+    assert [scale.reaches for scale in made.gains.thickness_scales] == [np.inf]
+    large, small = view.glance(source.seen()).kinds[:2] // 8
+    assert large > small > 0

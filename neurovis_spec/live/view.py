@@ -37,8 +37,9 @@ from neurovis_spec.scene import Scene, bundles
 from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.collapse import Gathered, gathered
 from neurovis_spec.scene.encode import looks, paint, tooltips
-from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.gains import Gains, Scale
 from neurovis_spec.scene.gathered_layout import standing
+from neurovis_spec.scene.legend_scales import nice_weights
 from neurovis_spec.scene.matrix import order_of
 from neurovis_spec.scene.pathway_words import told
 from neurovis_spec.scene.pathways import Pathway
@@ -299,7 +300,7 @@ def view_of(
     planned = planned or plan(drawn, stands, seen, settings)
     largest = np.ones(len(seen.thickness))
     for scale in seen.thickness_scales:
-        largest[seen.on_thickness(scale)] = scale.shown(scale.reaches or 1.0)
+        largest[seen.on_thickness(scale)] = _largest(scale)
     scene = _scene(drawn, planned, seen)
     rows = order_of(drawn.network, stands, range(len(drawn.network.neurons)))
     written = compiled.spec.render
@@ -400,3 +401,10 @@ def _short(numbers: FloatArray | None) -> npt.NDArray[np.float32]:
 
 def _parts(widths: npt.NDArray[np.float64]) -> npt.NDArray[np.uint16]:
     return np.minimum(np.rint(widths * FINENESS), _WIDEST).astype(np.uint16)
+
+
+def _largest(scale: Scale) -> float:
+    """The largest weight on a scale; where what is learned has no bound, the largest that a legend shows."""
+    if math.isfinite(scale.reaches) or not scale.gain:
+        return scale.shown(scale.reaches or 1.0)
+    return nice_weights(scale.gain)[-1]
