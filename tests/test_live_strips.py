@@ -207,6 +207,13 @@ def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp
             await opened.until("document.querySelector('#others').children.length == 1")
             words = await opened.ask("document.querySelector('#others button').textContent")
             assert words == f"from step 151 to {last}: as it went"
+            told_ = f"{TRACE.format(0)}.startsWith('O and T from step 0 to {last}:')"
+            await opened.until(f"{told_} && {TRACE.format(0)}.includes({went})")  # before it is gone over
+            await opened.ask(f"{SCRUB}.value = {last}; {SCRUB}.dispatchEvent(new Event('input'))")
+            await opened.ask("document.querySelector('#back').click()")
+            await opened.until(f"{STEP} == 149")  # one before the last that there is by now
+            await opened.ask("document.querySelector('#step').click()")
+            await opened.until(f"{STEP} == 150")
             await opened.key(" ")
             await opened.until(f"{STEP} > {last - 40} && {TRACE.format(0)}?.includes({went})")
             now = await pause(opened)

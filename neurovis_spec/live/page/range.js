@@ -101,17 +101,19 @@ export class Range {
   zoom(range) {
     const { look } = this.link;
     if (!look) return;
-    let [low, high] = range ?? [look.first, look.last];
+    const { end } = this.scrubber;
+    let [low, high] = range ?? [look.first, end];
     if (high - low < FEWEST) high = low + FEWEST;
-    [low, high] = [Math.max(look.first, low), Math.min(look.last, high)];
-    this.scrubber.range = low <= look.first && high >= look.last ? null : [low, high];
+    [low, high] = [Math.max(look.first, low), Math.min(end, high)];
+    this.scrubber.range = low <= look.first && high >= end ? null : [low, high];
     if (!this.scrubber.range && this.looped && this.owner) this.link.ask('unloop');
     this.show();
   }
 
   /** Play the steps that are shown over and over, or no more. */
   toggle() {
-    const { low, high } = this.scrubber;
+    const { low } = this.scrubber,
+      high = Math.min(this.scrubber.high, this.link.look?.last ?? 0);
     if (this.looped) this.link.ask('unloop');
     else if (high > low) {
       this.scrubber.range = [low, high];

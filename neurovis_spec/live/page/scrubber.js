@@ -14,7 +14,8 @@ export const THUMB = 8;
 const KEPT = 300,
   AGAIN = 30;
 
-/** Shows the steps from `low` to `high`, the latest `span` of them, or those around the step that is shown. */
+/** Shows the steps from `low` to `high`, the latest `span` of them, or those around the step that is shown; where the run
+ * goes on differently, those that it has still to go over, too. */
 export class Scrubber {
   /** @param {Link} link @param {(id: string) => HTMLElement} find @param {() => void} changed */
   constructor(link, find, changed) {
@@ -33,6 +34,9 @@ export class Scrubber {
     this.sought = -KEPT;
     this.goal = 0;
     this.timer = 0;
+    /** the last step of how it went before, which the run goes over differently, and the last that can be shown */
+    this.ahead = 0;
+    this.end = 0;
     /** the steps of the spec's events @type {number[]} */
     this.events = [];
     /** the steps from which on something is turned, those that are still to come again among them @type {number[]} */
@@ -58,6 +62,7 @@ export class Scrubber {
   /** Go to a step; of many that are sought in a drag, to some and the last. @param {number} step */
   seek(step) {
     this.sought = performance.now();
+    step = Math.min(step, this.link.look?.last ?? step);
     this.goal = step;
     if (this.timer) return;
     this.link.ask('seek', { step });
@@ -78,6 +83,9 @@ export class Scrubber {
     this.scrub.disabled = !status.owner;
     this.events = status.events;
     this.turned = status.turned.map((/** @type {{step: number}} */ { step }) => step + 1);
+    const left = status.futures.at(-1);
+    const differs = left && (left.turned.length > 0 || this.turned.some((step) => step > left.at));
+    this.ahead = differs ? left.last : 0;
   }
 
   /** How far across the axis a step is, from 0 to 1. @param {number} step @returns {number} */
@@ -105,20 +113,22 @@ export class Scrubber {
   show(look) {
     const { first, last, step } = look,
       span = Number(this.span.value) || Infinity,
+      end = Math.max(last, this.ahead),
       { scrub } = this;
+    this.end = end;
     const coming = this.known.filter((turn) => turn > step + 1 && turn <= last);
     this.known = [...new Set([...this.turned, ...coming])];
-    if (this.range && (this.range[0] >= last || this.range[1] <= first)) this.range = null;
+    if (this.range && (this.range[0] >= end || this.range[1] <= first)) this.range = null;
     if (this.range) {
-      [this.low, this.high] = [Math.max(first, this.range[0]), Math.min(last, this.range[1])];
+      [this.low, this.high] = [Math.max(first, this.range[0]), Math.min(end, this.range[1])];
       [scrub.min, scrub.max] = [String(this.low), String(this.high)];
       if (document.activeElement !== scrub || performance.now() - this.sought > KEPT) scrub.value = String(step);
     } else if (!scrub.matches(':active')) {
       const low = this.high - span,
         inside = (step > low || step === first) && step < this.high;
-      if (step === last || last - first <= span) this.high = last;
+      if (step === end || end - first <= span) this.high = end;
       else if (!inside) this.high = Math.round(step + span / 2);
-      this.high = Math.min(last, Math.max(this.high, first + span));
+      this.high = Math.min(end, Math.max(this.high, first + span));
       this.low = Math.max(first, this.high - span);
       [scrub.min, scrub.max] = [String(this.low), String(this.high)];
       if (document.activeElement !== scrub || performance.now() - this.sought > KEPT) scrub.value = String(step);
