@@ -111,6 +111,12 @@ async def looked_at(opened: Page, spec: str, folder: Path) -> None:
         assert cursor[3] <= hint[1] + 1, "the line of now runs through no words"
         overlaps = "[...document.querySelectorAll('.scale')].some(one => one.scrollWidth > one.clientWidth + 1)"
         assert not await opened.ask(overlaps), "a number leaves its button where it is"
+        for across in (0.02, 0.48, 0.98):
+            await opened.point(strip[0] + across * (strip[2] - strip[0]), strip[1] + 10)
+            await opened.until("!under.hidden && under.textContent")
+            words = await box(opened, "#under > div")
+            assert 0 <= words[0] < words[2] <= 1280, "what is said of the curves is not cut"
+        await opened.point(picture[0] + 1, picture[1] + 1)
         legend = await box(opened, "#legend")
         assert await opened.ask("document.querySelector('#legend').open") == is_beside
         assert legend[0] >= picture[2] or legend[3] <= picture[1] + 1, "it lies on nothing"

@@ -35,7 +35,7 @@ const SPIKE = 'spike';
 /** What a strip shows that is the raster of a neuron's group: no name. */
 const RASTER = '*';
 
-/** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is, and how pale that of a future that was left; how many characters an end of an axis has room for; milliseconds between two traces that are asked for, and until one is asked for again. */
+/** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is, and how pale that of a future that was left; how many characters an end of an axis has room for; how far what is said stands off the pointer, in pixels of a page; milliseconds between two traces that are asked for, and until one is asked for again. */
 const PINS = 8;
 /** How wide a curve is, in pixels: one is drawn forty times as quickly as a little more, which has an outline; and how many
  * bins are drawn in one go, as what an outline costs grows faster than its length. */
@@ -51,6 +51,7 @@ const TRACED = 24,
   FAINT = 0.5,
   WIDE = 4,
   FITS = 7,
+  AWAY = 6,
   PACE = 40,
   LOST = 2000;
 
@@ -291,10 +292,17 @@ export class Strips {
         return now || other ? `${names[at]}  ${now}${beside}` : '';
       }),
     );
-    const box = this.under.firstChild ?? this.under.appendChild(document.createElement('div'));
+    const box = /** @type {HTMLElement} */ (
+      this.under.firstChild ?? this.under.appendChild(document.createElement('div'))
+    );
     box.textContent = [this.axis.words(step), ...lines.filter(Boolean)].join('\n');
     const at = THUMB + this.scrubber.across(step) * (width - 2 * THUMB);
-    this.under.classList.toggle('late', at > width / 2);
+    const isLate = at > width / 2,
+      left = offsetLeft + at,
+      room = isLate ? left : this.place.clientWidth - left,
+      over = Math.max(0, box.offsetWidth + AWAY - room);
+    this.under.classList.toggle('late', isLate);
+    box.style.translate = `${isLate ? over : -over}px`;
     this.under.style.transform = `translateX(${(offsetLeft + at).toFixed(1)}px)`;
   }
 
