@@ -306,6 +306,44 @@ def test_they_are_bounded_where_a_larger_one_is_left_to_go_to_another(monkeypatc
     assert json.loads(status_message(run.shown().status, True))["dropped"] == 1, "which a page tells"
 
 
+def test_what_has_no_room_by_itself_goes_before_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = at(400)
+    for step in (10, 15, 17):
+        source.go(step)
+        source.turn(Set({"pull": 0.01 * step}))
+        while source.step < 20:
+            source.advance()
+    large = max(source.futures.all, key=lambda one: one.size)
+    source.switch(large.number)
+    (small,) = source.futures.all
+    assert len(small.within) == 2
+    monkeypatch.setattr(kept, "ROOM", large.size - 1)
+    source.switch(small.number)
+    assert [one.number for one in source.futures.all] == [one.number for one in small.within], (
+        "though the large one was left last"
+    )
+    assert source.futures.dropped == 1
+
+
+def test_they_stand_in_the_order_in_which_they_were_left() -> None:
+    """Also those that branch off from one that is gone to, and one that was deleted and is there again."""
+    source = at(30)
+    for step in (20, 15, 10, 18):
+        source.go(step)
+        source.turn(Set({"pull": 0.01 * step}))
+        while source.step < 25:
+            source.advance()
+    for number in [one.number for one in source.futures.all]:
+        source.switch(number)
+        places = [one.place for one in source.futures.all]
+        assert places == sorted(places)
+        assert source.futures.left is source.futures.all[-1]
+    first = source.futures.all[0].number
+    again = source.futures.forgotten(first).restored()
+    assert again is not None
+    assert [one.number for one in again.all] == [one.number for one in source.futures.all]
+
+
 def test_futures_are_named_deleted_with_those_within_and_had_again() -> None:
     source = at(30)
     source.go(10)

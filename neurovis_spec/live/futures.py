@@ -7,7 +7,7 @@ histories alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import Final, TypeAlias
@@ -113,7 +113,7 @@ class Futures:
     def taken_up(self, number: int) -> Futures:
         """With the run going on as one of these, and with what is within it."""
         (taken,) = [one for one in self.all if one.number == number]
-        rest = tuple(one for one in (*self.all, *taken.within) if one is not taken)
+        rest = _in_order(one for one in (*self.all, *taken.within) if one is not taken)
         return replace(self, all=rest, now=number, deleted=None)
 
     def renamed(self, number: int, name: str) -> Futures:
@@ -132,8 +132,8 @@ class Futures:
             return None
         one, within = self.deleted
         if within is None:
-            return replace(self, all=(*self.all, one), deleted=None)
-        put = _changed(self.all, within, lambda outer: replace(outer, within=(*outer.within, one)))
+            return replace(self, all=_in_order((*self.all, one)), deleted=None)
+        put = _changed(self.all, within, lambda outer: replace(outer, within=_in_order((*outer.within, one))))
         return replace(self, all=put, deleted=None)
 
     @property
@@ -169,8 +169,17 @@ def _every(futures: Sequence[Future]) -> list[Future]:
     return [found for one in futures for found in (one, *_every(one.within))]
 
 
+def _in_order(futures: Iterable[Future]) -> tuple[Future, ...]:
+    """In the order in which they were left."""
+    return tuple(sorted(futures, key=attrgetter("place")))
+
+
 def _bounded(futures: tuple[Future, ...], room: int) -> tuple[Future, ...]:
-    """Without the oldest, where they are too many or take too much room; one with others within it goes with these."""
+    """Without the oldest, where they are too many or take too much room, but before these without what has no room by
+    itself; one with others within it goes with these."""
+    for one in _every(futures):
+        if one.size > room:
+            futures = _pruned(futures, one.number)
     found = _every(futures)
     while len(found) > MOST or sum(one.size for one in found) > room:
         oldest = min(found, key=attrgetter("place"))

@@ -290,8 +290,9 @@ class SimulatedSource:
         return self.futures.leave(left)
 
     def switch(self, number: int, step: int | None = None) -> None:
-        """Go to another future, to a step, by default that which is shown, or to its last; of what is too much then the
-        oldest are forgotten. Raises SourceError, also where the body cannot do again what it has done."""
+        """Go to another future, to a step, by default that which is shown, or to its last; of what is too much then,
+        what has no room by itself is forgotten, and the oldest. Raises SourceError, also where the body cannot do again
+        what it has done."""
         path = self.futures.path(number)
         step = self.step if step is None else step
         if not path:

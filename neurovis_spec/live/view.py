@@ -239,7 +239,7 @@ class View:
 
     def partly(self, seen: Seen, items: Iterable[str]) -> dict[str, tuple[int, int]]:
         """Of which glyphs and lines, by these ids, some are lesioned and others not: how many, and of how many."""
-        if not self.drawn.any:
+        if not self.drawn.any or not (seen.lesioned_neurons.any() or seen.lesioned_connections.any()):
             return {}
         neurons, lines = self._lost(seen)
         kinds = {"n": (neurons, self.drawn.sizes), "c": (lines, self.drawn.counts)}
@@ -404,7 +404,8 @@ def _parts(widths: npt.NDArray[np.float64]) -> npt.NDArray[np.uint16]:
 
 
 def _largest(scale: Scale) -> float:
-    """The largest weight on a scale; where what is learned has no bound, the largest that a legend shows."""
+    """The largest weight on a scale, as it is shown; where what is learned has no bound, that of a line that is about
+    as wide as a legend has room for."""
     if math.isfinite(scale.reaches) or not scale.gain:
         return scale.shown(scale.reaches or 1.0)
     return nice_weights(scale.gain)[-1]

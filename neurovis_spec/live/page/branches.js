@@ -50,8 +50,11 @@ export class Branches {
   /** @param {Status} status */
   status({ futures, dropped, current, branch, owner, compared }) {
     [this.current, this.futures] = [current, futures];
-    if (this.dropped >= 0 && dropped > this.dropped)
-      this.undo.tell('the oldest branch was forgotten: there is room for 16, in 128 MiB');
+    const fewer = dropped - this.dropped;
+    if (this.dropped >= 0 && fewer > 0)
+      this.undo.tell(
+        `${fewer === 1 ? 'a branch was' : `${fewer} branches were`} forgotten: there is room for 16, in 128 MiB`,
+      );
     this.dropped = dropped;
     this.owner = owner;
     this.find('futures').hidden = !futures.length;
@@ -90,7 +93,8 @@ export class Branches {
       focused = list.contains(document.activeElement);
     this.find('current').replaceChildren(...this.run());
     list.replaceChildren(...this.rows(futures));
-    if (focused) (list.querySelector('button') || this.find('copy')).focus();
+    const summary = /** @type {HTMLElement} */ (document.querySelector('[data-fold=interventions] > summary'));
+    if (focused) (list.querySelector('button') ?? summary).focus();
   }
 
   /** The rows of a tree, the latest first. @param {Future[]} futures @returns {HTMLElement[]} */

@@ -284,7 +284,10 @@ const aside = new Aside(link, part, () => {
   room.arrange(aside.pictures);
   redraw();
 });
-const branches = new Branches(link, part, undo, (number, name) => strips.compare(number, name));
+const branches = new Branches(link, part, undo, (number, name) => {
+  scrubber.compare(number);
+  strips.compare(number, name);
+});
 const measuring = new Measuring(link, strips, part);
 const body = new Body(part('embodied'), part('posed'), part('bodily'), part('spatial'), redraw);
 const fitting = new Fitting(link, part('shown'), part('fitting'), () =>

@@ -24,12 +24,11 @@ const WIDE = 1.3,
   HALF = 0.45,
   BELOW = 220;
 /** How high a curve beside the network is at least: this share of the window, but so many pixels, and no more than so many;
- * how high at most where there is room; and how high the name is of what is held. */
+ * and how high at most where there is room. */
 const TRACE = 0.09,
   LOWEST = 40,
   HIGH = 90,
-  HIGHEST = 150,
-  HELD = 34;
+  HIGHEST = 150;
 /** What is left free around the legend; in a window narrower than this it is folded. */
 const GAP = 10,
   TELEPHONE = 600;
@@ -155,10 +154,9 @@ export class Room {
   /** Put the legend where there is room for it: below the curves, else in a corner of the picture. */
   place() {
     const { panel } = this.legend;
-    if (!this.scene || panel.hidden) return;
-    const isBeside = document.body.classList.contains('beside');
-    if (isBeside) this.below();
-    else this.cornered();
+    if (!this.scene) return;
+    if (document.body.classList.contains('beside')) this.below();
+    else if (!panel.hidden) this.cornered();
   }
 
   /** In the column of the curves. */
@@ -166,18 +164,24 @@ export class Room {
     const { legend, find } = this,
       { panel } = legend,
       wide = find('past').clientWidth - 2 * GAP,
-      { size } = legend.flow(wide);
-    panel.style.translate = '';
-    const body = find('embodied').hidden ? 0 : find('embodied').scrollHeight,
       { count, least, beside } = this.curves(),
-      free = find('shown').clientHeight - beside - count * least - legend.heading.offsetHeight - 2 * GAP;
-    if (!legend.isChosen) panel.open = size[1] <= free - Math.min(body, 200);
-    legend.draw(wide);
+      all = find('shown').clientHeight - beside;
+    panel.style.translate = '';
+    if (!panel.hidden) this.unfold(wide, all - count * least);
     // as high as there is room for, unless a body is shown there; what is held has room before it is
-    const all = count + (find('strips').classList.contains('nothing') ? 1 : 0),
-      held = HELD * (all - count);
-    const each = Math.floor((find('shown').clientHeight - panel.offsetHeight - beside - held) / all);
-    document.body.style.setProperty('--trace', `${body ? least : Math.max(least, Math.min(HIGHEST, each))}px`);
+    const curves = count + (find('strips').classList.contains('nothing') ? 1 : 0),
+      each = find('embodied').hidden ? Math.floor((all - panel.offsetHeight) / Math.max(1, curves)) : 0;
+    document.body.style.setProperty('--trace', `${Math.max(least, Math.min(HIGHEST, each))}px`);
+  }
+
+  /** Open the legend, or fold it, by the room that there is. @param {number} wide @param {number} high */
+  unfold(wide, high) {
+    const { legend, find } = this,
+      { panel } = legend,
+      { size } = legend.flow(wide),
+      body = find('embodied').hidden ? 0 : Math.min(find('embodied').scrollHeight, 200);
+    if (!legend.isChosen) panel.open = size[1] <= high - legend.heading.offsetHeight - 2 * GAP - body;
+    legend.draw(wide);
   }
 
   /** How many curves there are, how high each is at least, and how high all else is of what stands with them. */

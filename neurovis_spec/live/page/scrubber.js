@@ -2,6 +2,7 @@
  * The scrubber: the time axis, which strips share, the step on it, how far back it reaches, and what happened when.
  */
 
+import { every } from './branches.js';
 import { Sized } from './sized.js';
 
 /** @typedef {import('./protocol.js').Status} Status */
@@ -37,6 +38,11 @@ export class Scrubber {
     /** the last step of how it went before, which the run goes over differently, and the last that can be shown */
     this.ahead = 0;
     this.end = 0;
+    /** the other branches, and the one that is drawn behind the curves, null for that which was left last
+     * @type {Status['futures']} */
+    this.futures = [];
+    /** @type {number | null} */
+    this.branch = null;
     /** the steps of the spec's events @type {number[]} */
     this.events = [];
     /** the steps from which on something is turned, those that are still to come again among them @type {number[]} */
@@ -46,7 +52,11 @@ export class Scrubber {
     this.drawn = '';
     /** the steps that are shown alone, where some are @type {number[] | null} */
     this.range = null;
-    this.scrub.oninput = () => this.seek(Number(this.scrub.value));
+    this.scrub.oninput = () => {
+      const most = this.link.look?.last ?? Infinity;
+      if (Number(this.scrub.value) > most) this.scrub.value = String(most);
+      this.seek(Number(this.scrub.value));
+    };
     this.span.onchange = changed;
     this.changed = changed;
     find('time').addEventListener(
@@ -83,9 +93,24 @@ export class Scrubber {
     this.scrub.disabled = !status.owner;
     this.events = status.events;
     this.turned = status.turned.map((/** @type {{step: number}} */ { step }) => step + 1);
-    const left = status.futures.at(-1);
-    const differs = left && (left.turned.length > 0 || this.turned.some((step) => step > left.at));
-    this.ahead = differs ? left.last : 0;
+    this.futures = status.futures;
+    this.extend();
+  }
+
+  /** Another branch is drawn behind the curves, by its number; null for the one that was left last.
+   * @param {number | null} branch */
+  compare(branch) {
+    this.branch = branch;
+    this.extend();
+    this.changed();
+  }
+
+  /** Have the axis go on to the end of what is drawn behind the curves, where the run differs from that. */
+  extend() {
+    const left = this.futures.at(-1),
+      differs = left && (left.turned.length > 0 || this.turned.some((step) => step > left.at)),
+      chosen = every(this.futures).find(({ number }) => number === this.branch) ?? (differs ? left : undefined);
+    this.ahead = chosen?.last ?? 0;
   }
 
   /** How far across the axis a step is, from 0 to 1. @param {number} step @returns {number} */
@@ -118,14 +143,14 @@ export class Scrubber {
     this.end = end;
     const coming = this.known.filter((turn) => turn > step + 1 && turn <= last);
     this.known = [...new Set([...this.turned, ...coming])];
-    if (this.range && (this.range[0] >= end || this.range[1] <= first)) this.range = null;
+    if (this.range && (this.range[0] >= last || this.range[1] <= first)) this.range = null;
     if (this.range) {
       [this.low, this.high] = [Math.max(first, this.range[0]), Math.min(end, this.range[1])];
       [scrub.min, scrub.max] = [String(this.low), String(this.high)];
       if (document.activeElement !== scrub || performance.now() - this.sought > KEPT) scrub.value = String(step);
     } else if (!scrub.matches(':active')) {
       const low = this.high - span,
-        inside = (step > low || step === first) && step < this.high;
+        inside = (step > low || (step === first && low <= first)) && step < this.high;
       if (step === end || end - first <= span) this.high = end;
       else if (!inside) this.high = Math.round(step + span / 2);
       this.high = Math.min(end, Math.max(this.high, first + span));

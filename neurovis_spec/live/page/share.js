@@ -40,6 +40,8 @@ export class Share {
     this.fitting = fitting;
     /** goes to the view that the page was opened with */
     this.opens = (/** @type {string} */ _) => {};
+    /** pins curves, and says which there are not; with views these may be measures that are not there yet */
+    this.pins = (/** @type {string[]} */ texts) => curves.pin(texts);
     /** the curves that the page began with */
     this.begun = '';
     this.isBegun = false;
@@ -195,7 +197,10 @@ export class Share {
     const view = said.get('view')?.split(' ').map(number) ?? [];
     if (view.length === 3 && !view.includes(null))
       this.fitting.see(said.get('window') ?? USUAL, () => this.see(/** @type {number[]} */ (view)));
-    if (curves !== null) this.curves.pin(curves.split('\n'));
+    if (curves !== null) {
+      const unknown = this.pins(curves.split('\n'));
+      if (unknown.length) this.tell(`left out, as there is none here: ${unknown.join(', ')}`);
+    }
     const missing = branch === null ? '' : this.branches.go(branch);
     if (missing) this.tell(missing);
     this.run(missing ? null : number(said.get('step')), said.get('speed'));

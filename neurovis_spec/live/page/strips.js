@@ -35,14 +35,13 @@ const SPIKE = 'spike';
 /** What a strip shows that is the raster of a neuron's group: no name. */
 const RASTER = '*';
 
-/** The most strips that are pinned; how high marks of spikes are; how high a strip is, and which share of the window those have that a page begins with; how pale and how wide a line behind another is, and how pale that of a future that was left; how many characters an end of an axis has room for; how far what is said stands off the pointer, in pixels of a page; milliseconds between two traces that are asked for, and until one is asked for again. */
-const PINS = 8;
-/** How wide a curve is, in pixels: one is drawn forty times as quickly as a little more, which has an outline; and how many
- * bins are drawn in one go, as what an outline costs grows faster than its length. */
+/** How wide a curve is, in pixels: one is drawn some thirty times as quickly as a little more, which has an outline; and how
+ * many bins are drawn in one go, as what an outline costs grows faster than its length. */
 const THIN = 1,
   STRETCH = 32;
-/** The most that is drawn at once: what joined curves are besides is left out. */
-const TRACED = 24,
+/** The most strips that are pinned; the most that is drawn at once: what joined curves are besides is left out; how high marks of spikes are; how high a strip is, in windows of at least which height two begin, and which share of the window those have that a page begins with; how pale that behind another is, and that of a future that was left; how wide the first of these; how many characters an end of an axis has room for; how far what is said stands off the pointer, in pixels of a page; milliseconds between two traces that are asked for, and until one is asked for again. */
+const PINS = 8,
+  TRACED = 24,
   MARK = 6,
   HIGH = 72,
   LOW = 450,
@@ -663,7 +662,8 @@ function follow(context, trace, x, y) {
   context.beginPath();
   let before = NaN;
   for (let bin = 0; 2 * bin < trace.length; bin++) {
-    if (bin % STRETCH === 0 && bin > 0) {
+    // what is pale would be darker where two begin and end
+    if (bin % STRETCH === 0 && bin > 0 && context.globalAlpha === 1) {
       context.stroke();
       context.beginPath();
       if (!Number.isNaN(before)) context.moveTo(x(bin - 1), y(before));

@@ -74,6 +74,7 @@ export class Views {
       field.value = '';
     };
     share.opens = (name) => this.open(name);
+    share.pins = (texts) => this.pin(texts);
   }
 
   /** Who may save one. */
