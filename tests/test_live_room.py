@@ -217,12 +217,26 @@ def test_curves_beside_a_network_are_as_high_as_there_is_room_for(tmp_path: Path
             await opened.key("]")
             await opened.until(f"{heights} == '150,150'")
             assert await box(opened, "#strips canvas") == stood
-            for measure in ("C1 - C2", "C1 * C2", "abs(C1)", "abs(C2)"):
+            for number, measure in enumerate(("C1 - C2", "C1 * C2", "abs(C1)", "abs(C2)"), 3):
+                if number == 6:
+                    await opened.until(f"parseInt({heights}) < 90")
+                    held = await box(opened, "#strips canvas")
+                    await opened.key("Escape")
+                    await opened.until(f"{heights}.endsWith(',0')")
+                    assert await box(opened, "#strips canvas") == held
+                    await opened.key("]")
                 await opened.ask(f"measure.value = {json.dumps(measure)}; measuring.requestSubmit()")
-            await opened.until("document.querySelectorAll('.trace').length == 6")
+                await opened.until(f"document.querySelectorAll('.trace').length == {number}")
             await opened.until(f"new Set({heights}.split(',')).size == 1 && parseInt({heights}) < 90")
             assert await opened.ask("past.scrollHeight <= past.clientHeight + 4")
             await opened.size(1280, 1000)
+            await opened.until(f"parseInt({heights}) > 90")
+        (tmp_path / "bare.yaml").write_text(
+            "neurovis: 1\nname: bare\nneurons: {A: {bias: 1}, B: {}}\noutputs: {o: B}\nrender: {legend: false}\n"
+        )
+        async with shown(str(tmp_path / "bare.yaml"), tmp_path / "bare", curves=True) as (opened, _, _):
+            await opened.size(1280, 500)
+            await opened.until("document.body.classList.contains('beside')")
             await opened.until(f"parseInt({heights}) > 90")
 
     asyncio.run(main())

@@ -332,6 +332,10 @@ def test_curves_have_the_same_names_in_links_of_now_and_of_old_and_in_files(tmp_
             await opened.call("Page.navigate", url="about:blank")
             await opened.call("Page.navigate", url=f"{url}#curves={quote('N1~nobody~T' + chr(10) + 'nobody~T|v')}")
             await opened.until(f"{CURVES}.join() == 'N1 and T'")
+            await opened.until("document.querySelector('#refusal').textContent == 'left out, as there is none: nobody'")
+            await opened.call("Page.navigate", url="about:blank")
+            await opened.call("Page.navigate", url=f"{url}#curves={quote('rms(O, last=7)')}")
+            await opened.until(f"{CURVES}.join() == 'rms(O, last=7)'")
 
     asyncio.run(main())
 

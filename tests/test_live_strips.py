@@ -155,6 +155,26 @@ def test_strips_share_their_axis_with_the_scrubber(tmp_path: Path) -> None:
     asyncio.run(main())
 
 
+def test_a_restart_is_seen_though_a_longer_run_is_behind_it(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path, curves=True) as (opened, _, _):
+            await opened.ask("const speed = document.querySelector('#speed'); speed.value = 'max'; speed.onchange()")
+            await opened.until(f"{STEP} > 2500")
+            last = await pause(opened)
+            await opened.ask(f"{SCRUB}.value = {last - 500}; {SCRUB}.dispatchEvent(new Event('input'))")
+            await opened.until(f"{STEP} == {last - 500}")
+            await opened.key("]")
+            await opened.key("t")
+            await opened.ask("document.querySelector('#lesion').click()")
+            await opened.until("document.querySelector('#others').children.length == 1")
+            assert await opened.ask(f"{SCRUB}.max") == str(last)
+            await opened.ask("document.querySelector('#restart').click()")
+            await opened.until(f"{STEP} == 0 && {SCRUB}.min == '0'")
+            assert not await opened.ask("document.querySelector('#cursor').hidden")
+
+    asyncio.run(main())
+
+
 def test_it_jumps_to_events_which_are_marked_as_turns_are(tmp_path: Path) -> None:
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
@@ -210,8 +230,9 @@ def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp
             told_ = f"{TRACE.format(0)}.startsWith('O and T from step 0 to {last}:')"
             await opened.until(f"{told_} && {TRACE.format(0)}.includes({went})")  # before it is gone over
             await opened.ask(f"{SCRUB}.value = {last}; {SCRUB}.dispatchEvent(new Event('input'))")
+            assert await opened.ask(f"{SCRUB}.value") == "150", "the last step that there is by now"
             await opened.ask("document.querySelector('#back').click()")
-            await opened.until(f"{STEP} == 149")  # one before the last that there is by now
+            await opened.until(f"{STEP} == 149")
             await opened.ask("document.querySelector('#step').click()")
             await opened.until(f"{STEP} == 150")
             await opened.key(" ")

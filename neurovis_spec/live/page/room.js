@@ -166,11 +166,12 @@ export class Room {
       wide = find('past').clientWidth - 2 * GAP,
       { count, least, beside } = this.curves(),
       all = find('shown').clientHeight - beside;
+    // what is held has room before it is, so that nothing moves then
+    const curves = count + (find('strips').classList.contains('nothing') ? 1 : 0);
     panel.style.translate = '';
     if (!panel.hidden) this.unfold(wide, all - count * least);
-    // as high as there is room for, unless a body is shown there; what is held has room before it is
-    const curves = count + (find('strips').classList.contains('nothing') ? 1 : 0),
-      each = find('embodied').hidden ? Math.floor((all - panel.offsetHeight) / Math.max(1, curves)) : 0;
+    // as high as there is room for, unless a body is shown there
+    const each = find('embodied').hidden ? Math.floor((all - panel.offsetHeight) / Math.max(1, curves)) : 0;
     document.body.style.setProperty('--trace', `${Math.max(least, Math.min(HIGHEST, each))}px`);
   }
 
