@@ -525,6 +525,35 @@ connections: {K -> Q: 1}
     asyncio.run(main())
 
 
+def test_the_ends_of_an_axis_are_told_apart_and_what_rests_has_one(tmp_path: Path) -> None:
+    """S is 1 and −1 in turns, R 0.0001 above 0.495 and below it; Q only rounds."""
+    spec = """neurovis: 1
+name: rests
+time: {steps: 10, dt: 0.01}
+neurons: {S: {initial: 1}, R: {bias: 0.495}, Q: {bias: 0.495}}
+connections: {S -> S: -1, S -> R: 0.0001, S -> Q: 1.0e-8}
+outputs: {r: R, q: Q}
+render: {min_weight: 0}
+"""
+    (tmp_path / "rests.yaml").write_text(spec)
+
+    async def main() -> None:
+        async with shown(str(tmp_path / "rests.yaml"), tmp_path / "page") as (opened, _, _):
+            await opened.size(1280, 800)
+            await opened.until(f"{STEP} > 3")
+            for name in ("R", "Q"):
+                await opened.ask(f"measure.value = '{name}'; measuring.requestSubmit()")
+            await opened.until("document.querySelectorAll('.trace').length == 3")
+            await opened.ask("{ const s = document.querySelector('#speed'); s.value = 'max'; s.onchange() }")
+            await opened.until(f"{STEP} > 1200")
+            last = await pause(opened)
+            await opened.until(f"{TRACE.format(1)}?.includes('to {last}')")
+            ends = "[...document.querySelectorAll('.ends')].map((one) => one.innerText.replace('\\n', ' ')).join()"
+            await opened.until(f"{ends}.startsWith('0.4951 0.4949,0.495')")
+
+    asyncio.run(main())
+
+
 def test_a_strip_of_a_potential_has_marks_where_it_fires(tmp_path: Path) -> None:
     spec = """neurovis: 1
 name: fires

@@ -54,6 +54,12 @@ const PINS = 8,
   PACE = 40,
   LOST = 2000;
 
+/** Values have 32 bits: what differs by less than this share of them is rounding, and a curve that is at rest. */
+const ROUNDING = 1e-6;
+/** How many digits an end of an axis has, and fewer than how many where both would be the same. */
+const FEW = 3,
+  MOST = 9;
+
 /** A new element with a class. @template {keyof HTMLElementTagNameMap} T @param {T} tag @param {string} of
  * @returns {HTMLElementTagNameMap[T]} */
 function element(tag, of) {
@@ -582,10 +588,12 @@ export class Strips {
     const known = low <= high,
       top = fired ? 4 + MARK : 4,
       room = height - 4 - top;
-    write(strip.ends[0], known ? short(high) : '');
-    write(strip.ends[1], known && high > low ? short(low) : '');
+    const moves = known && high - low > ROUNDING * Math.max(Math.abs(low), Math.abs(high)),
+      ends = moves ? apart(low, high) : ['', known ? short(high) : ''];
+    write(strip.ends[0], ends[1]);
+    write(strip.ends[1], ends[0]);
     /** @param {number} value */
-    const y = (value) => top + room * (high > low ? (high - Math.min(high, Math.max(low, value))) / (high - low) : 0.5);
+    const y = (value) => top + room * (moves ? (high - Math.min(high, Math.max(low, value))) / (high - low) : 0.5);
     context.strokeStyle = line;
     context.setLineDash([2, 3]);
     context.beginPath();
@@ -689,6 +697,15 @@ function rounded(value) {
 
 /** A number in little room. @param {number} value @returns {string} */
 function short(value) {
-  const [fine, coarse] = [3, 2].map((digits) => String(Number(value.toPrecision(digits))).replace('-', '−'));
+  const [fine, coarse] = [FEW, FEW - 1].map((digits) => String(Number(value.toPrecision(digits))).replace('-', '−'));
   return fine.length > FITS ? coarse : fine;
+}
+
+/** Two numbers in little room, with as many digits as tell them apart. @param {number} low @param {number} high
+ * @returns {string[]} */
+function apart(low, high) {
+  let both = [low, high].map(short);
+  for (let digits = FEW + 1; both[0] === both[1] && digits < MOST; digits++)
+    both = [low, high].map((value) => String(Number(value.toPrecision(digits))).replace('-', '−'));
+  return both;
 }
