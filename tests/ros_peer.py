@@ -58,6 +58,7 @@ class Ros2:
 
         rclpy.init()
         self.node = rclpy.create_node(name)
+        self.publishers: list[Any] = []
         executor = rclpy.executors.SingleThreadedExecutor()
         executor.add_node(self.node)
         threading.Thread(target=executor.spin, daemon=True).start()
@@ -76,10 +77,17 @@ class Ros2:
 
     def sender(self, wish: Wish) -> tuple[Callable[[object], None], Callable[[], int]]:
         made = self.node.create_publisher(message_class(wish["type"]), wish["topic"], self.quality(wish))
+        self.publishers.append(made)
         return made.publish, made.get_subscription_count
 
     def close(self) -> None:
-        pass
+        """Once those who listen have what was sent, and a moment to look at it."""
+        from rclpy.duration import Duration
+
+        for publisher in self.publishers:
+            publisher.wait_for_all_acked(Duration(seconds=10))
+        if self.publishers:
+            time.sleep(0.2)
 
 
 class Ros1:

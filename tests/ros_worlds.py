@@ -133,6 +133,8 @@ class Process:
             raise AssertionError(f"it does not end: {self.out} {self.err}") from None
         for thread in self._threads:
             thread.join(5)
+        if status < 0:
+            print(*self.err, sep="\n")
         return status
 
     def stop(self) -> int:
@@ -161,7 +163,8 @@ class World:
         assert self.bin.is_dir(), f"there is no environment {self.bin.parent}: make test-ros makes it"
         self.processes: list[Process] = []
         kept = {key: value for key, value in os.environ.items() if key not in _OURS and not key.startswith("ROS_")}
-        self.environment = {**kept, "PYTHONUNBUFFERED": "1"}
+        # a crash of ROS says where it was
+        self.environment = {**kept, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"}
         self._core: Process | None = None
         self._claim: socket.socket | None = None
         if self.ros == 1:
