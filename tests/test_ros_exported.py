@@ -421,7 +421,7 @@ import sys, time
 sys.path.insert(0, sys.argv[1])
 from arm_publisher import NETWORK, Publisher
 shown = Publisher(NETWORK)
-while not shown.subscribers:
+while not shown.heard:
     time.sleep(0.01)
 for step in range(200):
     time.sleep(0.002)
@@ -439,7 +439,7 @@ int main(int argc, char **argv) {
   ros::init(argc, argv, "controller");
   ros::NodeHandle node;
   neurovis::Publisher shown(node, neurovis::arm_network());
-  while (shown.subscribers() == 0) ros::Duration(0.01).sleep();
+  while (!shown.heard()) ros::Duration(0.01).sleep();
   std::vector<double> activity(7), weights(3);
   for (int step = 0; step < 200; ++step) {
     ros::Duration(0.002).sleep();

@@ -62,6 +62,12 @@ class Publisher:
         """How many listen to the activities."""
         return int(self._middleware.subscribers(self._activity))
 
+    @property
+    def heard(self) -> bool:
+        """Whether somebody listens to all that is published."""
+        weighed = self._weights is None or self._middleware.subscribers(self._weights) > 0
+        return self.subscribers > 0 and weighed
+
     def _message(self, what: str, values: Iterable[float], size: int, step: int, now: float) -> Any:
         data = array("d", (step, now))
         data.extend(values)
