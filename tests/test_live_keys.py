@@ -60,6 +60,9 @@ def test_whatever_has_the_focus_has_an_outline_that_is_seen(theme: str, tmp_path
             await pause(opened)
             await opened.key("]")
             await opened.key("t")
+            await opened.ask("document.querySelector('#lesion').click()")
+            await opened.until("!document.querySelector('#copy').disabled")  # there are events to be copied
+            await opened.ask("document.activeElement.blur()")
             seen = set()
             for _ in range(80):
                 for kind in ("rawKeyDown", "keyUp"):
