@@ -11,7 +11,7 @@ from urllib.parse import quote
 import pytest
 from test_live_browser import STEP, pause, shown
 from test_live_hand import at_hand
-from test_live_strips import JOIN, SCRUB, TYPED
+from test_live_strips import JOIN, SCRUB, TYPED, scrub
 from test_live_undo import undone
 
 import neurovis_spec as nv
@@ -79,7 +79,7 @@ def test_a_link_opens_the_page_where_it_stood_for_owners_and_viewers(tmp_path: P
 
             await opened.key("]")
             await opened.key("p")
-            await opened.ask(f"{SCRUB}.value = {step} / 2; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, f"{step} / 2")
             await opened.until(f"{STEP} == {SCRUB}.value && {STEP} < {step}")
             cursor = "cursor.getBoundingClientRect().left"
             await opened.until(f"Math.abs({cursor} - ({AXIS})) < 1")
@@ -115,7 +115,7 @@ def test_a_link_goes_to_its_branch_and_says_where_it_cannot(tmp_path: Path) -> N
             first, curves = await opened.ask("location.href"), await opened.ask(CURVES)
             assert isinstance(curves, list)
             assert curves[:2] == ["C1 and K2", "O against T"]
-            await opened.ask(f"{SCRUB}.value = 20; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, 20)
             await opened.until(f"{STEP} == 20 && !document.querySelector('#branch').disabled")
             await opened.ask("['branch', 'step'].forEach((id) => document.getElementById(id).click())")
             await opened.ask("document.querySelector('#strips .pin').click()")
@@ -348,14 +348,14 @@ def test_what_begins_at_the_step_that_is_shown_is_gone_back_to_and_undone(tmp_pa
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
             await opened.until(f"{STEP} > 30")
             last = await pause(opened)
-            await opened.ask(f"{SCRUB}.value = 20; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, 20)
             await opened.until(f"{STEP} == 20")
             await opened.key("]")
             await opened.ask("document.querySelector('#lesion').click()")
             await opened.until(f"{go}?.textContent == 'from step 21 to {last}: as it went'")
             await opened.ask(f"{go}.click()")
             await opened.until(f"{go}?.textContent == 'from step 21 on: step 21: lesion C1'")
-            await opened.ask(f"{SCRUB}.value = 25; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, 25)
             await opened.until(f"{STEP} == 25 && {current} == '0'")
             await opened.ask(f"{go}.click()")
             await opened.until(f"{STEP} == 20 && {current} == '1'")
@@ -377,7 +377,7 @@ def test_going_to_a_branch_is_undone(tmp_path: Path) -> None:
         async with at_hand(tmp_path) as (opened, _, _):
             await opened.until(f"{STEP} > 30")
             await pause(opened)
-            await opened.ask(f"{SCRUB}.value = 20; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, 20)
             await opened.until(f"{STEP} == 20 && !document.querySelector('#branch').disabled")
             await opened.ask("['branch', 'step'].forEach((id) => document.getElementById(id).click())")
             await opened.until(f"{current} == '1'")

@@ -34,6 +34,11 @@ TYPED = "document.querySelector('#measure').value = {0}; document.querySelector(
 MARKS = INK.format("document.querySelector('#marks')")
 
 
+async def scrub(opened: Page, step: object) -> None:
+    """Drag the slider to a step."""
+    await opened.ask(f"{SCRUB}.value = {step}; {SCRUB}.dispatchEvent(new Event('input'))")
+
+
 async def numbers(opened: Page, *scripts: str) -> list[float]:
     """The values of some expressions."""
     found = await opened.ask(f"[{', '.join(scripts)}].map(Number)")
@@ -144,7 +149,7 @@ def test_strips_share_their_axis_with_the_scrubber(tmp_path: Path) -> None:
                 await opened.key("<")
             await opened.until(f"{SCRUB}.min == '0'")
             await opened.until(f"{TRACE.format(0)}?.includes('from step 0 to {last}')")
-            await opened.ask(f"{SCRUB}.value = 200; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, 200)
             await opened.until(f"{STEP} == 200")
             for _ in range(5):
                 await opened.key(">")
@@ -161,7 +166,7 @@ def test_a_restart_is_seen_though_a_longer_run_is_behind_it(tmp_path: Path) -> N
             await opened.ask("const speed = document.querySelector('#speed'); speed.value = 'max'; speed.onchange()")
             await opened.until(f"{STEP} > 2500")
             last = await pause(opened)
-            await opened.ask(f"{SCRUB}.value = {last - 500}; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, last - 500)
             await opened.until(f"{STEP} == {last - 500}")
             await opened.key("]")
             await opened.key("t")
@@ -217,7 +222,7 @@ def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp
             last = await pause(opened)
             went = "', behind it how it went before'"
             assert not await opened.ask(f"{TRACE.format(0)}.includes({went})")
-            await opened.ask(f"{SCRUB}.value = 150; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, 150)
             await opened.until(f"{STEP} == 150")
             x, y = places(compiled)["K3"]
             await opened.click(x, y)
@@ -229,7 +234,7 @@ def test_a_new_curve_runs_over_the_pale_old_one_which_one_click_goes_back_to(tmp
             assert words == f"from step 151 to {last}: as it went"
             told_ = f"{TRACE.format(0)}.startsWith('O and T from step 0 to {last}:')"
             await opened.until(f"{told_} && {TRACE.format(0)}.includes({went})")  # before it is gone over
-            await opened.ask(f"{SCRUB}.value = {last}; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, last)
             assert await opened.ask(f"{SCRUB}.value") == "150", "the last step that there is by now"
             await opened.ask("document.querySelector('#back').click()")
             await opened.until(f"{STEP} == 149")
@@ -295,16 +300,16 @@ async def side_by_side(opened: Page, buttons: str) -> None:
 
     await opened.ask(f"{buttons}[2].click()")
     await opened.until(two)
-    await opened.ask(f"{SCRUB}.value = 250; {SCRUB}.dispatchEvent(new Event('input'))")
+    await scrub(opened, 250)
     await opened.until(f"{STEP} == 250 && other.ariaLabel.includes('step 250')")
     run, branch = await seen()
     assert run != branch
     await pointed_at_in(opened)
-    await opened.ask(f"{SCRUB}.value = 120; {SCRUB}.dispatchEvent(new Event('input'))")
+    await scrub(opened, 120)
     await opened.until(f"{STEP} == 120 && other.ariaLabel.includes('step 120')")
     before = await seen()
     assert before[0] == before[1]
-    await opened.ask(f"{SCRUB}.value = 250; {SCRUB}.dispatchEvent(new Event('input'))")
+    await scrub(opened, 250)
     await opened.until(f"{STEP} == 250")
     await opened.ask(f"{buttons}[0].click()")
     await opened.until("!document.body.classList.contains('compared')")
@@ -347,7 +352,7 @@ def test_a_branch_goes_on_from_the_step_that_is_shown(tmp_path: Path) -> None:
             await opened.until(f"{STEP} > 30")
             await pause(opened)
             assert await opened.ask("document.querySelector('#branch').disabled"), "nothing came after"
-            await opened.ask(f"{SCRUB}.value = 20; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, 20)
             await opened.until(f"{STEP} == 20 && !document.querySelector('#branch').disabled")
             await opened.key("b")
             await opened.until(f"{SCRUB}.max == '20' && document.querySelector('#branch').disabled")
@@ -630,7 +635,7 @@ def test_a_curve_is_added_by_typing_it_and_those_who_look_on_see_it(tmp_path: Pa
 
 async def behind_a_plane(opened: Page, step: int, before: list[npt.NDArray[np.float64]], ink: str) -> None:
     """How a plane went in the branch that is left lies pale in it, in an axis that has room for both."""
-    await opened.ask(f"{SCRUB}.value = 60; {SCRUB}.dispatchEvent(new Event('input'))")
+    await scrub(opened, 60)
     await opened.until(f"{STEP} == 60")
     await opened.key("t")
     await opened.ask("document.querySelector('#picture').focus()")

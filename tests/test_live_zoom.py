@@ -15,7 +15,7 @@ from PIL import Image
 from test_live_browser import STEP, pause, shown
 from test_live_drawing import opened as drawn_alone
 from test_live_looking import TIP, places, told
-from test_live_strips import SCRUB
+from test_live_strips import scrub
 from test_live_undo import undone
 
 from neurovis_spec.live.view import LEVELS, view_of
@@ -298,7 +298,7 @@ def test_beside_another_branch_what_is_told_is_of_both(tmp_path: Path) -> None:
             await opened.size(1280, 800)
             await opened.until(f"{STEP} > 12")
             await pause(opened)
-            await opened.ask(f"{SCRUB}.value = 5; {SCRUB}.dispatchEvent(new Event('input'))")
+            await scrub(opened, 5)
             await opened.until(f"{STEP} == 5")
             await opened.key("]")
             await told(opened, "A1")

@@ -258,23 +258,23 @@ class View:
         if not drawn.any:
             return seen.lesioned_neurons, seen.lesioned_connections
         outside = drawn.bundle >= 0
-        return (
-            np.bincount(drawn.unit, seen.lesioned_neurons, len(drawn.sizes)).astype(np.int64),
-            np.bincount(drawn.bundle[outside], seen.lesioned_connections[outside], len(drawn.counts)).astype(np.int64),
-        )
+        lines = np.bincount(drawn.bundle[outside], seen.lesioned_connections[outside], len(drawn.counts))
+        return self._many(seen.lesioned_neurons), lines.astype(np.int64)
 
     @property
     def radius(self) -> float:
         """That of the discs of neurons, in page units."""
         return RADIUS * self.plan.frame.scale / self.plan.unit
 
+    def _many(self, neurons: Mask) -> Mask | IntArray:
+        """How many such neurons each glyph stands for."""
+        drawn = self.drawn
+        return np.bincount(drawn.unit, neurons, len(drawn.sizes)).astype(np.int64) if drawn.any else neurons
+
     def _all(self, neurons: Mask) -> Mask:
         """Which glyphs stand for such neurons and no others."""
-        drawn = self.drawn
-        if not drawn.any:
-            return neurons
-        some: Mask = np.bincount(drawn.unit, neurons, len(drawn.sizes)) == drawn.sizes
-        return some
+        every: Mask = self._many(neurons) == self.drawn.sizes
+        return every
 
 
 def view_of(
